@@ -1,0 +1,25 @@
+# Finds every library that photosphere links. Used by the build and, installed beside
+# photosphereConfig.cmake, by consumers of the package: both need the same two repairs.
+
+find_package(Threads REQUIRED)
+find_package(ZLIB REQUIRED)
+find_package(TBB REQUIRED)
+find_package(fmt REQUIRED)
+find_package(spdlog REQUIRED)
+find_package(glm REQUIRED)
+
+# Debian keeps FindOpenVDB.cmake off the search path. It calls find_package(Boost) for iostreams.
+find_path(PHOTOSPHERE_FIND_OPENVDB_DIR FindOpenVDB.cmake
+  PATHS /usr/lib/${CMAKE_LIBRARY_ARCHITECTURE}/cmake/OpenVDB /usr/lib/cmake/OpenVDB
+        /usr/local/lib/cmake/OpenVDB
+  DOC "Folder of FindOpenVDB.cmake")
+if(PHOTOSPHERE_FIND_OPENVDB_DIR)
+  list(APPEND CMAKE_MODULE_PATH "${PHOTOSPHERE_FIND_OPENVDB_DIR}")
+endif()
+find_package(OpenVDB 10.0 REQUIRED COMPONENTS openvdb)
+
+find_package(OpenEXR 3.1 REQUIRED)
+find_package(OpenImageIO 2.4 REQUIRED)
+
+# Debian puts OpenColorIOConfig.cmake straight into /usr/share/cmake, where find_package does not look.
+find_package(OpenColorIO 2.1 REQUIRED PATHS /usr/share/cmake)

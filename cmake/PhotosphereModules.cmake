@@ -1,0 +1,53 @@
+# photosphere_module(NAME name [USES module...] [LIBRARIES target...])
+#
+# Declares one module from every .cpp of the calling folder (searched recursively): an object library
+# whose objects become part of the library `photosphere`. USES is the row of the module table: the
+# modules that this one may include. It is recorded for the layer test, which reads the includes.
+define_property(GLOBAL PROPERTY PHOTOSPHERE_MODULES BRIEF_DOCS "Module names, lowest first")
+define_property(GLOBAL PROPERTY PHOTOSPHERE_MODULE_TABLE BRIEF_DOCS "module: used modules")
+
+function(photosphere_module)
+  cmake_parse_arguments(PARSE_ARGV 0 arg "" "NAME" "USES;LIBRARIES;SOURCES")
+  set(target photosphere_${arg_NAME})
+  file(GLOB_RECURSE sources CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/*.cpp")
+  if(NOT sources AND NOT arg_SOURCES)
+    return()
+  endif()
+  add_library(${target} OBJECT ${sources} ${arg_SOURCES})
+  target_include_directories(${target}
+    PUBLIC "$<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include>"
+    PRIVATE "${CMAKE_CURRENT_SOURCE_DIR}")
+  target_link_libraries(${target} PRIVATE photosphere_settings)
+  target_link_libraries(${target} PUBLIC glm::glm fmt::fmt ${arg_LIBRARIES})
+  if(PHOTOSPHERE_TIDY)
+    set_target_properties(${target} PROPERTIES CXX_CLANG_TIDY "${PHOTOSPHERE_CLANG_TIDY}")
+  endif()
+  set_property(GLOBAL APPEND PROPERTY PHOTOSPHERE_MODULES ${arg_NAME})
+  string(JOIN " " uses ${arg_USES})
+  set_property(GLOBAL APPEND PROPERTY PHOTOSPHERE_MODULE_TABLE "${arg_NAME}: ${uses}")
+endfunction()
+
+# photosphere_plugins(MODULE module TYPE type FUNCTION function HEADER header PLUGINS stem...)
+#
+# Generates the constant table of a plug-in folder. Each stem is a source `<stem>.cpp` that defines
+# `const <type> photosphere::<module>::plugins::<stem>`; the table is what `<function>()` returns,
+# a std::span<const <type>* const>. A self-registering static would be dropped by the linker from a
+# static library; this table cannot be.
+function(photosphere_plugins)
+  cmake_parse_arguments(PARSE_ARGV 0 arg "" "MODULE;TYPE;FUNCTION;HEADER" "PLUGINS")
+  set(declarations "")
+  set(entries "")
+  foreach(stem IN LISTS arg_PLUGINS)
+    string(APPEND declarations "extern const ${arg_TYPE} ${stem};\n")
+    string(APPEND entries "    &plugins::${stem},\n")
+  endforeach()
+  set(PLUGIN_MODULE "${arg_MODULE}")
+  set(PLUGIN_TYPE "${arg_TYPE}")
+  set(PLUGIN_FUNCTION "${arg_FUNCTION}")
+  set(PLUGIN_HEADER "${arg_HEADER}")
+  set(PLUGIN_DECLARATIONS "${declarations}")
+  set(PLUGIN_ENTRIES "${entries}")
+  set(output "${PROJECT_BINARY_DIR}/generated/${arg_MODULE}_${arg_FUNCTION}.cpp")
+  configure_file("${PROJECT_SOURCE_DIR}/cmake/plugin_table.cpp.in" "${output}" @ONLY)
+  target_sources(photosphere_${arg_MODULE} PRIVATE "${output}")
+endfunction()

@@ -1,0 +1,83 @@
+#pragma once
+// Lights: the table of models, their illumination of a point and their photons. All in local space
+// [m] (ARCHITECTURE.md, Precision): world positions minus the smoke's centre, times metres per unit.
+
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "photosphere/core/param.h"
+#include "photosphere/core/types.h"
+
+namespace photosphere::lights {
+
+/// Local space of a scene: local = (world - center) * metersPerUnit.
+struct LocalSpace {
+  Vec3d center{0.0};
+  double metersPerUnit = 1.0;
+
+  Vec3d localFromWorld(const Vec3d& p) const { return (p - center) * metersPerUnit; }
+  Vec3d worldFromLocal(const Vec3d& p) const { return p / metersPerUnit + center; }
+};
+
+/// Bounding sphere of the smoke, local space [m]: what photons are aimed at.
+struct BoundingSphere {
+  Vec3d center{0.0};
+  double radius = 1.0;
+};
+
+/// Light that arrives at a point from a light without extent, or from one sampled direction.
+struct Illumination {
+  Vec3f direction{0.0f};           ///< unit, along propagation (from the light to the point)
+  float distance = kInfinity;      ///< to the light [m]; infinite for directional, environment
+  Rgb irradiance{0.0f};            ///< normal irradiance [W/m^2] without extinction; for an environment
+                                   ///< sample: radiance over its density (radiance / pdf)
+};
+
+/// A photon at birth. Position in double: a light may be far away.
+struct Emission {
+  Vec3d origin{0.0};               ///< local space [m]
+  Vec3f direction{0.0f};           ///< unit
+  Rgb power{0.0f};                 ///< [W] when one photon is emitted; divide by the count
+};
+
+class Light {
+ public:
+  virtual ~Light() = default;
+  const std::string& name() const { return m_name; }
+  void setName(std::string name) { m_name = std::move(name); }
+
+  /// Power that reaches the bounding sphere when nothing is in the way [W], per channel: what photon
+  /// emission draws from. Zero for a light that cannot reach it.
+  virtual Rgb power(const BoundingSphere& bounds) const = 0;
+  /// Draws a photon that enters the bounding sphere, or starts inside it. E[power] = power(bounds).
+  /// @param u  four uniform numbers in [0, 1)
+  virtual Emission emit(const BoundingSphere& bounds, const Vec4f& u) const = 0;
+  /// Illumination of a point. Lights without extent ignore `u`. Thread-safe.
+  virtual Illumination illuminate(const Vec3f& point, const Vec2f& u) const = 0;
+  /// True for a light without extent or spread of directions: `illuminate` is exact.
+  virtual bool isDelta() const = 0;
+  /// Radiance that a ray which leaves the scene in `direction` meets [W m^-2 sr^-1].
+  virtual Rgb background(const Vec3f& direction) const {
+    (void)direction;
+    return Rgb(0.0f);
+  }
+  /// True when no channel differs from another.
+  virtual bool isGrey() const = 0;
+
+ private:
+  std::string m_name;
+};
+
+struct LightPlugin {
+  std::string_view name;
+  std::string_view help;
+  std::span<const Param> params;
+  std::unique_ptr<Light> (*create)(const ParamValues& values, const LocalSpace& space);
+};
+
+/// Every light (generated).
+std::span<const LightPlugin* const> lightModels();
+
+}  // namespace photosphere::lights

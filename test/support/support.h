@@ -1,0 +1,68 @@
+#pragma once
+// Helpers that every test program shares.
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "photosphere/core/types.h"
+
+namespace photosphere::test {
+
+/// A folder of its own that disappears with the object.
+class TemporaryFolder {
+ public:
+  TemporaryFolder();
+  ~TemporaryFolder();
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  const std::filesystem::path& path() const { return m_path; }
+  std::filesystem::path operator/(const std::string& name) const { return m_path / name; }
+
+ private:
+  std::filesystem::path m_path;
+};
+
+/// A file of the project, by its path below the root.
+std::filesystem::path projectFile(const std::string& relative);
+
+/// A file below the folder of caches written by other software. Use through FOREIGN_CACHE, which skips
+/// the test, saying so, when the folder is absent.
+std::filesystem::path foreignCache(const std::string& relative);
+
+/// A process and what it printed.
+struct RunResult {
+  int exitCode = -1;  ///< 128 + signal when a signal ended it
+  std::string out;
+  std::string err;
+};
+/// Runs the photosphere program with these arguments (no shell).
+RunResult runTool(const std::vector<std::string>& arguments,
+                  const std::filesystem::path& workingFolder = {});
+/// Runs a command line through /bin/sh.
+RunResult runShell(const std::string& command, const std::filesystem::path& workingFolder = {});
+
+std::string readText(const std::filesystem::path& path);
+void writeText(const std::filesystem::path& path, const std::string& content);
+
+/// Pearson chi-squared test of a direction sampler against its density, over `8 rows^2`-cell bins of
+/// equal area with pooled small cells.
+/// @param sample   draws a direction from two uniform numbers
+/// @param density  [1/sr]
+/// @return p-value; a correct sampler gives values uniform in [0, 1]
+double directionChiSquared(const std::function<Vec3f(const Vec2f&)>& sample,
+                           const std::function<double(const Vec3f&)>& density, int count,
+                           std::uint64_t seed);
+
+/// Upper tail of the chi-squared distribution.
+double chiSquaredTail(double statistic, double degreesOfFreedom);
+
+}  // namespace photosphere::test
+
+#define FOREIGN_CACHE(variable, relative)                                              \
+  const std::filesystem::path variable = ::photosphere::test::foreignCache(relative);  \
+  if (!std::filesystem::exists(variable))                                              \
+  GTEST_SKIP() << "no foreign cache at " << variable.string() << " (set PHOTOSPHERE_FOREIGN_CACHES)"
