@@ -27,7 +27,9 @@ TemporaryFolder::~TemporaryFolder() {
   fs::remove_all(m_path, ignored);
 }
 
-fs::path projectFile(const std::string& relative) { return fs::path(PHOTOSPHERE_SOURCE_DIR) / relative; }
+fs::path projectFile(const std::string& relative) {
+  return fs::path(PHOTOSPHERE_SOURCE_DIR) / relative;
+}
 fs::path foreignCache(const std::string& relative) {
   return fs::path(PHOTOSPHERE_FOREIGN_CACHES) / relative;
 }
@@ -58,7 +60,8 @@ RunResult run(const std::vector<std::string>& command, const fs::path& workingFo
     dup2(errFd, 2);
     if (!workingFolder.empty() && chdir(workingFolder.c_str()) != 0) _exit(126);
     std::vector<char*> arguments;
-    for (const std::string& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
+    for (const std::string& word : command)
+      arguments.push_back(const_cast<char*>(word.c_str()));
     arguments.push_back(nullptr);
     execvp(arguments[0], arguments.data());
     _exit(127);

@@ -29,8 +29,8 @@ class TemporaryFolder {
 /// A file of the project, by its path below the root.
 std::filesystem::path projectFile(const std::string& relative);
 
-/// A file below the folder of caches written by other software. Use through FOREIGN_CACHE, which skips
-/// the test, saying so, when the folder is absent.
+/// A file below the folder of caches written by other software. Use through FOREIGN_CACHE, which
+/// skips the test, saying so, when the folder is absent.
 std::filesystem::path foreignCache(const std::string& relative);
 
 /// A process and what it printed.
@@ -48,8 +48,8 @@ RunResult runShell(const std::string& command, const std::filesystem::path& work
 std::string readText(const std::filesystem::path& path);
 void writeText(const std::filesystem::path& path, const std::string& content);
 
-/// Pearson chi-squared test of a direction sampler against its density, over `8 rows^2`-cell bins of
-/// equal area with pooled small cells.
+/// Pearson chi-squared test of a direction sampler against its density, over `8 rows^2`-cell bins
+/// of equal area with pooled small cells.
 /// @param sample   draws a direction from two uniform numbers
 /// @param density  [1/sr]
 /// @return p-value; a correct sampler gives values uniform in [0, 1]
@@ -62,7 +62,7 @@ double chiSquaredTail(double statistic, double degreesOfFreedom);
 
 }  // namespace photosphere::test
 
-#define FOREIGN_CACHE(variable, relative)                                              \
-  const std::filesystem::path variable = ::photosphere::test::foreignCache(relative);  \
-  if (!std::filesystem::exists(variable))                                              \
+#define FOREIGN_CACHE(variable, relative)                                             \
+  const std::filesystem::path variable = ::photosphere::test::foreignCache(relative); \
+  if (!std::filesystem::exists(variable))                                             \
   GTEST_SKIP() << "no foreign cache at " << variable.string() << " (set PHOTOSPHERE_FOREIGN_CACHES)"

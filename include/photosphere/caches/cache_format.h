@@ -16,11 +16,11 @@ namespace photosphere::caches {
 
 /// Everything that one cache file of one frame holds.
 struct CacheContent {
-  std::vector<volume::Grid> grids;                 ///< without point grids
-  std::vector<volume::ParticleSet> particles;      ///< one set per point grid or particle system
-  std::vector<std::string> particleNames;          ///< same length as `particles`
+  std::vector<volume::Grid> grids;             ///< without point grids
+  std::vector<volume::ParticleSet> particles;  ///< one set per point grid or particle system
+  std::vector<std::string> particleNames;      ///< same length as `particles`
   std::map<std::string, std::string> metadata;
-  std::vector<std::string> notes;                  ///< what the user should know: skipped, widened
+  std::vector<std::string> notes;  ///< what the user should know: skipped, widened
 };
 
 /// One format: its source file's stem is its name. A nullptr function means "cannot".
@@ -42,7 +42,8 @@ struct CacheFormat {
 std::span<const CacheFormat* const> cacheFormats();
 
 /// The format of a file: by content, then by extension.
-/// @throws InputMissingError; InputError that names what to export instead for known foreign formats
+/// @throws InputMissingError; InputError that names what to export instead for known foreign
+/// formats
 const CacheFormat& detectFormat(const std::filesystem::path& path);
 
 /// The format that writes this extension. @throws ConfigError listing those that can

@@ -8,7 +8,8 @@ struct Effects {
   bool singleScattering = true;
   bool multipleScattering = true;
   bool shadows = true;
-  bool chromatic = false;  ///< false: one channel is traced and stored, as lights and media are grey
+  bool chromatic =
+      false;  ///< false: one channel is traced and stored, as lights and media are grey
   bool motionBlur = false;
   bool depthOfField = false;
   bool environment = false;

@@ -1,6 +1,6 @@
 #pragma once
-// Errors that end a command. Each kind has one exit code (the table is in the README); `cli` catches
-// them once. Nothing throws inside a ray: radiance code counts and marks instead.
+// Errors that end a command. Each kind has one exit code (the table is in the README); `cli`
+// catches them once. Nothing throws inside a ray: radiance code counts and marks instead.
 
 #include <stdexcept>
 #include <string>

@@ -1,6 +1,6 @@
 #pragma once
-// 64-bit fixed-point sums (METHOD section 6): integer addition does not depend on order, so the same
-// deposits give the same bits for any number of threads, shards or restarts.
+// 64-bit fixed-point sums (METHOD section 6): integer addition does not depend on order, so the
+// same deposits give the same bits for any number of threads, shards or restarts.
 
 #include <atomic>
 #include <cstdint>
@@ -13,7 +13,8 @@ inline std::int64_t quantize(double value, double inverseQuantum, std::uint32_t 
   const double scaled = value * inverseQuantum;
   const double whole = static_cast<double>(static_cast<std::int64_t>(scaled));
   const double fraction = scaled - whole;  // same sign as value; values here are never negative
-  return static_cast<std::int64_t>(whole) + (fraction > static_cast<double>(bits) * 0x1p-32 ? 1 : 0);
+  return static_cast<std::int64_t>(whole) +
+         (fraction > static_cast<double>(bits) * 0x1p-32 ? 1 : 0);
 }
 
 /// Adds to a sum that other threads may add to at the same time.

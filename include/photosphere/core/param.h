@@ -35,9 +35,9 @@ struct Param {
   std::string_view help;
   double min = -std::numeric_limits<double>::infinity();
   double max = std::numeric_limits<double>::infinity();
-  std::string_view choices = {};     ///< `a|b|c`, empty = free
-  std::string_view unserved = {};    ///< choices known to the contract that this version lacks
-  bool served = true;                ///< false: any value but the default is refused as not served yet
+  std::string_view choices = {};   ///< `a|b|c`, empty = free
+  std::string_view unserved = {};  ///< choices known to the contract that this version lacks
+  bool served = true;  ///< false: any value but the default is refused as not served yet
 };
 
 using ParamValue = std::variant<bool, std::int64_t, double, std::string, std::vector<double>,
@@ -72,7 +72,6 @@ class ParamValues {
   std::string format(std::string_view name) const;
 
  private:
-  const Param& row(std::string_view name) const;
   const ParamValue& value(std::string_view name) const;
 
   std::vector<Param> m_rows;

@@ -17,7 +17,8 @@ namespace photosphere {
 template <class Plugin>
 std::vector<std::string_view> pluginNames(std::span<const Plugin* const> table) {
   std::vector<std::string_view> names;
-  for (const Plugin* plugin : table) names.push_back(plugin->name);
+  for (const Plugin* plugin : table)
+    names.push_back(plugin->name);
   return names;
 }
 

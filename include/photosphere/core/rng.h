@@ -1,6 +1,6 @@
 #pragma once
-// Counter-based random numbers: each value is a function of (seed, frame, stream, index, dimension),
-// so work can be split over threads, shards and restarts without changing one bit.
+// Counter-based random numbers: each value is a function of (seed, frame, stream, index,
+// dimension), so work can be split over threads, shards and restarts without changing one bit.
 
 #include <Random123/philox.h>
 

@@ -28,7 +28,9 @@ inline Vec3f directionFromCosine(float cosTheta, float turns) {
 }
 
 /// Uniform on the sphere, density 1 / (4 pi).
-inline Vec3f sampleSphere(const Vec2f& u) { return directionFromCosine(1.0f - 2.0f * u.x, u.y); }
+inline Vec3f sampleSphere(const Vec2f& u) {
+  return directionFromCosine(1.0f - 2.0f * u.x, u.y);
+}
 
 /// Uniform in a cone about +z; density 1 / (2 pi (1 - cosMax)).
 /// @param oneMinusCosMax  1 - cos(half-angle), which a narrow cone needs exact

@@ -27,9 +27,15 @@ using Mat4d = glm::dmat4;
 /// Linear colour in the rendering space; its unit is that of the quantity it holds.
 using Rgb = glm::vec3;
 
-inline float maxComponent(const Vec3f& v) { return glm::max(v.x, glm::max(v.y, v.z)); }
-inline double maxComponent(const Vec3d& v) { return glm::max(v.x, glm::max(v.y, v.z)); }
-inline float meanComponent(const Vec3f& v) { return (v.x + v.y + v.z) * (1.0f / 3.0f); }
+inline float maxComponent(const Vec3f& v) {
+  return glm::max(v.x, glm::max(v.y, v.z));
+}
+inline double maxComponent(const Vec3d& v) {
+  return glm::max(v.x, glm::max(v.y, v.z));
+}
+inline float meanComponent(const Vec3f& v) {
+  return (v.x + v.y + v.z) * (1.0f / 3.0f);
+}
 
 /// Axis-aligned box; empty (max < min) when default constructed.
 template <class V>
@@ -60,9 +66,13 @@ using Box3d = Box<Vec3d>;
 using Box3i = Box<Vec3i>;
 
 /// Applies an affine matrix to a position.
-inline Vec3d transformPoint(const Mat4d& m, const Vec3d& p) { return Vec3d(m * glm::dvec4(p, 1.0)); }
+inline Vec3d transformPoint(const Mat4d& m, const Vec3d& p) {
+  return Vec3d(m * glm::dvec4(p, 1.0));
+}
 /// Applies the linear part of an affine matrix to a direction or displacement.
-inline Vec3d transformVector(const Mat4d& m, const Vec3d& v) { return Mat3d(m) * v; }
+inline Vec3d transformVector(const Mat4d& m, const Vec3d& v) {
+  return Mat3d(m) * v;
+}
 
 inline constexpr double kPi = 3.14159265358979323846;
 inline constexpr float kPiF = 3.14159265358979323846f;

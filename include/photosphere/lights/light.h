@@ -1,6 +1,7 @@
 #pragma once
 // Lights: the table of models, their illumination of a point and their photons. All in local space
-// [m] (ARCHITECTURE.md, Precision): world positions minus the smoke's centre, times metres per unit.
+// [m] (ARCHITECTURE.md, Precision): world positions minus the smoke's centre, times metres per
+// unit.
 
 #include <memory>
 #include <span>
@@ -29,17 +30,17 @@ struct BoundingSphere {
 
 /// Light that arrives at a point from a light without extent, or from one sampled direction.
 struct Illumination {
-  Vec3f direction{0.0f};           ///< unit, along propagation (from the light to the point)
-  float distance = kInfinity;      ///< to the light [m]; infinite for directional, environment
-  Rgb irradiance{0.0f};            ///< normal irradiance [W/m^2] without extinction; for an environment
-                                   ///< sample: radiance over its density (radiance / pdf)
+  Vec3f direction{0.0f};       ///< unit, along propagation (from the light to the point)
+  float distance = kInfinity;  ///< to the light [m]; infinite for directional, environment
+  Rgb irradiance{0.0f};        ///< normal irradiance [W/m^2] without extinction; for an environment
+                               ///< sample: radiance over its density (radiance / pdf)
 };
 
 /// A photon at birth. Position in double: a light may be far away.
 struct Emission {
-  Vec3d origin{0.0};               ///< local space [m]
-  Vec3f direction{0.0f};           ///< unit
-  Rgb power{0.0f};                 ///< [W] when one photon is emitted; divide by the count
+  Vec3d origin{0.0};      ///< local space [m]
+  Vec3f direction{0.0f};  ///< unit
+  Rgb power{0.0f};        ///< [W] when one photon is emitted; divide by the count
 };
 
 class Light {
@@ -48,8 +49,8 @@ class Light {
   const std::string& name() const { return m_name; }
   void setName(std::string name) { m_name = std::move(name); }
 
-  /// Power that reaches the bounding sphere when nothing is in the way [W], per channel: what photon
-  /// emission draws from. Zero for a light that cannot reach it.
+  /// Power that reaches the bounding sphere when nothing is in the way [W], per channel: what
+  /// photon emission draws from. Zero for a light that cannot reach it.
   virtual Rgb power(const BoundingSphere& bounds) const = 0;
   /// Draws a photon that enters the bounding sphere, or starts inside it. E[power] = power(bounds).
   /// @param u  four uniform numbers in [0, 1)

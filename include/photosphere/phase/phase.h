@@ -11,7 +11,8 @@ namespace photosphere::phase {
 
 /// Henyey-Greenstein phase function [1/sr], normalised over the sphere; g = 0 is isotropic.
 /// Both directions along propagation: forward scattering keeps the direction.
-/// Evaluated as METHOD section 6 asks: (1-|g|)^2 + 2|g| (1 - s cos), which keeps the peak near |g| = 1.
+/// Evaluated as METHOD section 6 asks: (1-|g|)^2 + 2|g| (1 - s cos), which keeps the peak near |g|
+/// = 1.
 class HenyeyGreenstein {
  public:
   /// @param g  mean cosine, -1 < g < 1. @throws ConfigError outside

@@ -8,9 +8,9 @@
 
 namespace photosphere::sphere {
 
-/// Each octant is divided like a triangle: row i of n (0 at the pole) holds 2 i + 1 cells that share
-/// the octant's azimuth evenly. Row i spans z from 1 - (i/n)^2 down to 1 - ((i+1)/n)^2 (mirrored below
-/// the equator), so that all cells have area 4 pi / (8 n^2).
+/// Each octant is divided like a triangle: row i of n (0 at the pole) holds 2 i + 1 cells that
+/// share the octant's azimuth evenly. Row i spans z from 1 - (i/n)^2 down to 1 - ((i+1)/n)^2
+/// (mirrored below the equator), so that all cells have area 4 pi / (8 n^2).
 class Partition {
  public:
   /// @param rows  n >= 1. @throws ConfigError

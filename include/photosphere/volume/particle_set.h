@@ -14,9 +14,9 @@ namespace photosphere::volume {
 
 /// Columns that an attribute may hold. Narrower types are widened on reading, unsigned 32 bit to
 /// 64 bit signed.
-using AttributeData = std::variant<std::vector<float>, std::vector<double>,
-                                   std::vector<std::int32_t>, std::vector<std::int64_t>,
-                                   std::vector<std::string>>;
+using AttributeData =
+    std::variant<std::vector<float>, std::vector<double>, std::vector<std::int32_t>,
+                 std::vector<std::int64_t>, std::vector<std::string>>;
 
 /// One named column: `arity` values a particle, particle by particle.
 struct Attribute {
@@ -30,7 +30,8 @@ struct Attribute {
   double number(std::size_t i, int c = 0) const;
 };
 
-/// Particles of one frame: positions in world space [scene units] and attributes under Houdini names
+/// Particles of one frame: positions in world space [scene units] and attributes under Houdini
+/// names
 /// (`v pscale id Cd density temperature age mass`).
 class ParticleSet {
  public:

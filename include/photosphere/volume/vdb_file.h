@@ -19,7 +19,8 @@ struct VdbFile {
   std::map<std::string, std::string> metadata;
 
   /// The grid of that name.
-  /// @throws InputError (exit 4) listing the grids when it is missing, or when several share the name
+  /// @throws InputError (exit 4) listing the grids when it is missing, or when several share the
+  /// name
   const Grid& find(std::string_view name) const;
   /// First grid of that name, or nullptr.
   const Grid* tryFind(std::string_view name) const;
@@ -39,13 +40,13 @@ VdbFile readVdb(const std::filesystem::path& path);
 void writeVdb(const std::filesystem::path& path, const std::vector<Grid>& grids,
               const std::map<std::string, std::string>& metadata = {});
 
-/// A point data grid of all attributes. `v` etc. keep their names; vec3 float attributes are stored as
-/// vec3s, arity 2, 4 and above as strided float, text as string attributes.
+/// A point data grid of all attributes. `v` etc. keep their names; vec3 float attributes are stored
+/// as vec3s, arity 2, 4 and above as strided float, text as string attributes.
 /// @param voxelSize  edge of a point voxel [scene units]; 0 = chosen for about 8 points a voxel
 Grid pointsToGrid(const ParticleSet& particles, std::string_view name, double voxelSize);
 
-/// All points of a point data grid, in the grid's own order (leaf by leaf), positions in world space.
-/// Any position codec (float, half, fixed point 8 and 16) and attribute type.
+/// All points of a point data grid, in the grid's own order (leaf by leaf), positions in world
+/// space. Any position codec (float, half, fixed point 8 and 16) and attribute type.
 ParticleSet gridToPoints(const Grid& grid);
 
 /// Creates a float grid from dense values: x fastest, `values.size() == dim.x * dim.y * dim.z`.

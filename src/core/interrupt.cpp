@@ -1,0 +1,50 @@
+#include "photosphere/core/interrupt.h"
+
+#include <signal.h>
+#include <unistd.h>
+
+#include <string>
+
+#include "photosphere/core/error.h"
+#include "photosphere/core/output_file.h"
+
+namespace photosphere {
+
+namespace {
+
+volatile sig_atomic_t g_signal = 0;
+
+void onSignal(int signal) {
+  if (g_signal != 0) {
+    removeTemporaries();
+    _exit(128 + signal);
+  }
+  g_signal = signal;
+}
+
+}  // namespace
+
+InterruptedError::InterruptedError(int signal)
+    : Error(ExitCode::unspecified, "stopped by signal " + std::to_string(signal)),
+      m_signal(signal) {}
+
+void installSignalHandlers() {
+  struct sigaction action = {};
+  action.sa_handler = onSignal;
+  sigemptyset(&action.sa_mask);
+  for (const int signal : {SIGINT, SIGTERM, SIGUSR1})
+    sigaction(signal, &action, nullptr);
+  // A file-size limit must surface as a failed write, not as a death.
+  ::signal(SIGXFSZ, SIG_IGN);
+  ::signal(SIGPIPE, SIG_IGN);
+}
+
+int pendingSignal() {
+  return g_signal;
+}
+
+void throwIfInterrupted() {
+  if (g_signal != 0) throw InterruptedError(g_signal);
+}
+
+}  // namespace photosphere

@@ -1,0 +1,64 @@
+#include "photosphere/core/resources.h"
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <fstream>
+#include <limits>
+
+namespace photosphere {
+
+std::uint64_t peakMemoryBytes() {
+  rusage usage = {};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
+}
+
+double processCpuSeconds() {
+  rusage usage = {};
+  getrusage(RUSAGE_SELF, &usage);
+  auto seconds = [](const timeval& t) {
+    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+  };
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
+namespace {
+
+std::uint64_t readNumber(const char* path, std::uint64_t otherwise) {
+  std::ifstream in(path);
+  std::uint64_t value = 0;
+  return in >> value ? value : otherwise;
+}
+
+}  // namespace
+
+std::uint64_t availableMemoryBytes() {
+  constexpr std::uint64_t unlimited = std::numeric_limits<std::uint64_t>::max();
+  std::uint64_t free = unlimited;
+  std::ifstream meminfo("/proc/meminfo");
+  std::string key, unit;
+  std::uint64_t kib = 0;
+  while (meminfo >> key >> kib && std::getline(meminfo, unit))
+    if (key == "MemAvailable:") free = kib * 1024;
+  // cgroup v2, then v1; "max" and huge numbers mean no limit.
+  const std::uint64_t limit =
+      std::min(readNumber("/sys/fs/cgroup/memory.max", unlimited),
+               readNumber("/sys/fs/cgroup/memory/memory.limit_in_bytes", unlimited));
+  const std::uint64_t used =
+      std::min(readNumber("/sys/fs/cgroup/memory.current", 0) +
+                   readNumber("/sys/fs/cgroup/memory/memory.usage_in_bytes", 0),
+               limit);
+  return std::min(free, limit == unlimited ? unlimited : limit - used);
+}
+
+std::string formatBytes(std::uint64_t bytes) {
+  const double b = static_cast<double>(bytes);
+  if (b >= 1024.0 * 1024 * 1024) return fmt::format("{:.2f} GiB", b / (1024.0 * 1024 * 1024));
+  if (b >= 1024.0 * 1024) return fmt::format("{:.1f} MiB", b / (1024.0 * 1024));
+  if (b >= 1024.0) return fmt::format("{:.1f} KiB", b / 1024.0);
+  return fmt::format("{} bytes", bytes);
+}
+
+}  // namespace photosphere

@@ -1,0 +1,1 @@
+#include "photosphere/image/image.h"
