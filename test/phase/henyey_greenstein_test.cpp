@@ -103,6 +103,20 @@ TEST_P(Lobe, MaximumIsThePeakAndIsNeverExceeded) {
   }
 }
 
+// Exact where the chi-squared tests are only statistical: the angle drawn for u has probability 1 -
+// u of being smaller.
+TEST_P(Lobe, SampleInvertsTheCumulativeDistribution) {
+  const double g = GetParam(), sign = g < 0 ? -1 : 1;
+  const HenyeyGreenstein phase(g);
+  const Vec3f wi(0, 0, 1);
+  for (int i = 0; i < 4096; ++i) {
+    const float u = (static_cast<float>(i) + 0.5f) / 4096.0f;
+    const Vec3d wo(phase.sample(wi, {u, 0.3f}));
+    const Vec3d d = wo - sign * Vec3d(wi);
+    ASSERT_NEAR(static_cast<double>(cumulative(g, glm::dot(d, d) / 2)), 1 - u, 2e-6) << u;
+  }
+}
+
 // Cells of equal probability in the closed-form distribution of the angle, times azimuth.
 TEST_P(Lobe, SamplesFollowTheClosedForm) {
   const double g = GetParam(), sign = g < 0 ? -1 : 1;
