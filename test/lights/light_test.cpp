@@ -111,6 +111,18 @@ TEST(Spot, HasClosedFormPowers) {
       Rgb(0));
 }
 
+TEST(Power, OfTheOtherLightsIsTheirClosedForm) {
+  const BoundingSphere bounds{{1, 0, 0}, 2};
+  const auto power = [&](const char* type, const Options& options) {
+    return static_cast<double>(makeLight(type, options)->power(bounds).r);
+  };
+  EXPECT_NEAR(power("point", {{"position", "[0, 0, 1]"}}) / (4 * kPi), 1.0, 1e-6);
+  EXPECT_NEAR(power("point", {{"position", "[5, 0, 0]"}}) / (2 * kPi * (1 - std::sqrt(0.75))), 1.0,
+              1e-6);
+  EXPECT_NEAR(power("directional", {{"intensity", "3"}}) / (3 * 4 * kPi), 1.0, 1e-6);
+  EXPECT_NEAR(power("environment", {{"intensity", "0.5"}}) / (0.5 * 4 * kPi * 4 * kPi), 1.0, 1e-6);
+}
+
 TEST(Limits, IlluminationIsFiniteAtAndAroundTheLight) {
   for (const char* type : {"point", "spot"}) {
     Options options{{"position", "[0, 0, 0]"}};
