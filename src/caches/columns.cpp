@@ -100,10 +100,15 @@ void takeRun(std::size_t first, const std::vector<std::string>& names, std::vect
   const std::string_view name = single || component < 0 ? std::string_view(names[first]) : base;
   for (const std::size_t index : run)
     used[index] = true;
-  groups.push_back({volume::houdiniName(name), std::move(run)});
+  groups.push_back({attributeName(name), std::move(run)});
 }
 
 }  // namespace
+
+std::string attributeName(std::string_view name) {
+  const std::string lower = lowered(name);
+  return lower == "normal" || lower == "normals" ? "N" : volume::houdiniName(name);
+}
 
 std::string lowered(std::string_view text) {
   std::string result(text);

@@ -23,6 +23,9 @@ std::vector<ColumnGroup> groupColumns(const std::vector<std::string>& names);
 /// The scalar column names that stand for an attribute, the inverse of groupColumns.
 std::vector<std::string> columnNames(std::string_view attribute, int arity);
 
+/// volume::houdiniName, and `N` for normals.
+std::string attributeName(std::string_view name);
+
 /// Lower-case ASCII copy.
 std::string lowered(std::string_view text);
 

@@ -85,8 +85,8 @@ void decodeComponent(const unsigned char* records, std::size_t count, const Reco
 
 class Columns {
  public:
-  Columns(const RecordLayout& layout, std::uint64_t count) : m_layout(layout) {
-    const std::size_t expected = static_cast<std::size_t>(count);
+  Columns(const RecordLayout& layout, std::uint64_t reserve) : m_layout(layout) {
+    const std::size_t expected = static_cast<std::size_t>(reserve);
     for (const Channel& channel : layout.channels) {
       if (isPosition(channel)) {
         m_set.positions.reserve(expected);
@@ -183,12 +183,12 @@ std::size_t scalarSize(Scalar type) {
 }
 
 volume::ParticleSet readRecords(const RecordLayout& layout, std::uint64_t count,
-                                const FetchRecords& fetch) {
+                                std::uint64_t reserve, const FetchRecords& fetch) {
   const std::size_t perBlock =
       std::max<std::size_t>(1, kBlock / std::max<std::size_t>(1, layout.stride));
   std::vector<unsigned char> block(
       static_cast<std::size_t>(std::min<std::uint64_t>(count, perBlock)) * layout.stride);
-  Columns columns(layout, count);
+  Columns columns(layout, reserve);
   for (std::uint64_t done = 0; done < count;) {
     const std::size_t wanted =
         static_cast<std::size_t>(std::min<std::uint64_t>(count - done, perBlock));

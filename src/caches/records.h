@@ -42,9 +42,10 @@ struct RecordLayout {
 using FetchRecords = std::function<std::size_t(unsigned char* records, std::size_t count)>;
 
 /// Reads records in blocks of about a megabyte until `count` are there or `fetch` gives fewer than
-/// it was asked for. The caller has bounded `count` by the size of the file.
+/// it was asked for. The caller has bounded `count` and `reserve` by the size of the file.
+/// @param reserve  particles to make room for at once
 volume::ParticleSet readRecords(const RecordLayout& layout, std::uint64_t count,
-                                const FetchRecords& fetch);
+                                std::uint64_t reserve, const FetchRecords& fetch);
 
 /// Writes the particles as records in blocks of about a megabyte. A channel of the name of an
 /// attribute takes its components; `divisor` multiplies them.

@@ -217,19 +217,20 @@ volume::ParticleSet readVertices(FileReader& file, const PlyElement& vertex,
     throw InputError(file.path(),
                      "element 'vertex' has no properties x, y, z; export with positions");
   const bool direct = !header.ascii && !vertex.hasLists();
-  return readRecords(layout, vertex.count, [&](unsigned char* records, std::size_t count) {
-    if (direct) {
-      file.read(records, count * layout.stride, "element 'vertex'");
-      return count;
-    }
-    for (std::size_t i = 0; i < count; ++i, records += layout.stride) {
-      if (header.ascii)
-        readTextRow(file, vertex, records);
-      else
-        readBinaryRow(file, vertex, header.order, records);
-    }
-    return count;
-  });
+  return readRecords(layout, vertex.count, vertex.count,
+                     [&](unsigned char* records, std::size_t count) {
+                       if (direct) {
+                         file.read(records, count * layout.stride, "element 'vertex'");
+                         return count;
+                       }
+                       for (std::size_t i = 0; i < count; ++i, records += layout.stride) {
+                         if (header.ascii)
+                           readTextRow(file, vertex, records);
+                         else
+                           readBinaryRow(file, vertex, header.order, records);
+                       }
+                       return count;
+                     });
 }
 
 CacheContent read(const std::filesystem::path& path, const ParamValues&) {
