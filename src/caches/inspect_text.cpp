@@ -58,7 +58,7 @@ void appendParticles(std::string& text, const ParticleReport& set) {
     text += fmt::format("    spacing     {:.6g} (median)\n", set.medianSpacing);
   for (const AttributeReport& attribute : set.attributes) {
     const std::string arity = attribute.arity == 1 ? "" : fmt::format("[{}]", attribute.arity);
-    text += fmt::format("    {:<12}{}{}", attribute.name, attribute.type, arity);
+    text += fmt::format("    {:<11} {}{}", attribute.name, attribute.type, arity);
     if (attribute.hasValues)
       text += fmt::format("  min {:.6g}  max {:.6g}  mean {:.6g}", attribute.min, attribute.max,
                           attribute.mean);

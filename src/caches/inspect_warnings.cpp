@@ -25,6 +25,12 @@ std::string metadataOf(const CacheContent& content, const std::string& key) {
   return {};
 }
 
+/// Blender names itself in some versions only, but always leaves its domain's resolution.
+bool isBlender(const CacheContent& content) {
+  return lowered(metadataOf(content, "creator")).find("blender") != std::string::npos ||
+         !metadataOf(content, "file_base_resolution").empty();
+}
+
 Box3d wholeBox(const InspectReport& report) {
   Box3d box;
   for (const GridReport& grid : report.grids)
@@ -39,13 +45,14 @@ std::string guessUnits(const InspectReport& report, const CacheContent& content)
   if (parseReal(metadataOf(content, "LengthUnitInMeters"), metres) && metres > 0)
     return fmt::format("1 unit = {:.6g} m (the file says so): meters_per_unit = {:.6g}", metres,
                        metres);
+  if (isBlender(content)) return "metres (Blender's default)";
   const std::string creator = lowered(metadataOf(content, "creator"));
-  if (creator.find("blender") != creator.npos) return "metres (Blender's default)";
   if (creator.find("houdini") != creator.npos) return "metres (Houdini's default)";
   if (report.format == "uni") return "none in the file (set voxel_size)";
   const Box3d box = wholeBox(report);
   if (box.empty()) return "unknown (nothing with an extent)";
   const double size = maxComponent(box.extent());
+  if (size == 0) return "unknown (nothing with an extent)";
   if (size > kLargeBox)
     return fmt::format(
         "centimetres or millimetres, as the box is {:.6g} units long: meters_per_unit = "
@@ -136,16 +143,15 @@ void judgeFile(InspectReport& report, const CacheContent& content) {
   if (report.grids.empty() && report.particles.empty())
     report.warnings.push_back("holds neither grids nor particles");
   const Box3d box = wholeBox(report);
-  if (!box.empty() && glm::length(box.center()) > kFarInSizes * glm::length(box.extent()))
+  if (maxComponent(box.extent()) > 0 &&
+      glm::length(box.center()) > kFarInSizes * glm::length(box.extent()))
     report.warnings.push_back(
         "lies so far from the origin for its size that float positions show steps");
-  const std::string creator = lowered(metadataOf(content, "creator"));
-  const bool blender = creator.find("blender") != creator.npos;
   const bool corner =
       std::any_of(content.grids.begin(), content.grids.end(), [](const volume::Grid& g) {
         return g.isAffine() && Vec3d(g.worldFromIndex()[3]) != Vec3d(0);
       });
-  if (blender && !content.grids.empty() && !corner)
+  if (isBlender(content) && !content.grids.empty() && !corner)
     report.warnings.push_back(
         "Blender leaves out where the domain lies: give its lowest corner plus half "
         "a voxel as the volume's translation");

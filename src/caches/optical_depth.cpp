@@ -11,6 +11,7 @@ namespace photosphere::caches {
 namespace {
 
 constexpr std::int64_t kMaxColumns = 1 << 20;
+constexpr double kTrace = 1e-3;  // of the thickest ray: thinner ones meet no smoke
 
 /// Sums of density over the voxel columns of one axis.
 class Columns {
@@ -73,13 +74,14 @@ std::optional<OpticalDepth> measure(const GridType& grid, const volume::Grid& ha
   const Box3i bounds = handle.activeBounds();
   if (bounds.empty()) return std::nullopt;
   Columns columns[3] = {{bounds, 0}, {bounds, 1}, {bounds, 2}};
-  double sum = 0, voxels = 0;
+  double sum = 0, squares = 0;
   for (auto value = grid.cbeginValueOn(); value; ++value) {
     const double density = static_cast<double>(*value);
     if (!std::isfinite(density) || density <= 0) continue;
     const openvdb::CoordBBox box = value.getBoundingBox();
-    sum += density * static_cast<double>(value.getVoxelCount());
-    voxels += static_cast<double>(value.getVoxelCount());
+    const double mass = density * static_cast<double>(value.getVoxelCount());
+    sum += mass;
+    squares += mass * density;
     for (Columns& axis : columns)
       axis.add(box, density);
   }
@@ -88,12 +90,15 @@ std::optional<OpticalDepth> measure(const GridType& grid, const volume::Grid& ha
   for (int axis = 0; axis < 3; ++axis)
     columns[axis].collect(edge[axis], depths);
   if (depths.empty()) return std::nullopt;
+  // Solvers leave traces of 1e-30 all over their domain, which are no smoke.
+  const double thickest = *std::max_element(depths.begin(), depths.end());
+  std::erase_if(depths, [&](double depth) { return depth < kTrace * thickest; });
+  if (!std::isfinite(thickest) || depths.empty()) return std::nullopt;
   OpticalDepth result;
   result.p5 = percentile(depths, 0.05);
   result.median = percentile(depths, 0.5);
   result.p95 = percentile(depths, 0.95);
-  result.meanFreePathVoxels = voxels / sum / std::cbrt(edge.x * edge.y * edge.z);
-  if (!std::isfinite(result.p95) || !(result.p95 > 0)) return std::nullopt;
+  result.meanFreePathVoxels = sum / squares / std::cbrt(edge.x * edge.y * edge.z);
   result.suggestedScale = roundedToTwoDigits(kSmokeOpticalDepth / result.p95);
   return result;
 }

@@ -14,7 +14,7 @@ namespace photosphere::caches {
 /// Optical depths at density_scale 1 along axis-aligned rays that meet the smoke.
 struct OpticalDepth {
   double p5 = 0, median = 0, p95 = 0;  ///< percentiles over the rays of all three axes
-  double meanFreePathVoxels = 0;       ///< 1 / mean density of the active voxels
+  double meanFreePathVoxels = 0;       ///< 1 / mean density, weighted by density
   double suggestedScale = 0;           ///< density_scale that brings p95 to kSmokeOpticalDepth
 };
 
