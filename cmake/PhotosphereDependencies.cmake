@@ -1,5 +1,5 @@
 # Finds every library that photosphere links. Used by the build and, installed beside
-# photosphereConfig.cmake, by consumers of the package: both need the same two repairs.
+# photosphereConfig.cmake, by consumers of the package: both need the same repairs.
 
 find_package(Threads REQUIRED)
 find_package(ZLIB REQUIRED)
@@ -24,3 +24,16 @@ find_package(OpenImageIO 2.4 REQUIRED)
 
 # Debian puts OpenColorIOConfig.cmake straight into /usr/share/cmake, where find_package does not look.
 find_package(OpenColorIO 2.1 REQUIRED PATHS /usr/share/cmake)
+
+# Two of Debian's targets name include folders that are not there, at which CMake stops: OpenImageIO
+# that of OpenCV, which its package does not require, and OpenColorIO the folder /include.
+foreach(target IN ITEMS OpenImageIO::OpenImageIO OpenColorIO::OpenColorIO)
+  get_target_property(PHOTOSPHERE_INCLUDES ${target} INTERFACE_INCLUDE_DIRECTORIES)
+  set(PHOTOSPHERE_PRESENT "")
+  foreach(folder IN LISTS PHOTOSPHERE_INCLUDES)
+    if(IS_DIRECTORY "${folder}" OR folder MATCHES "^[$]<")
+      list(APPEND PHOTOSPHERE_PRESENT "${folder}")
+    endif()
+  endforeach()
+  set_target_properties(${target} PROPERTIES INTERFACE_INCLUDE_DIRECTORIES "${PHOTOSPHERE_PRESENT}")
+endforeach()

@@ -38,7 +38,8 @@ struct Illumination {
 
 /// A photon at birth. Position in double: a light may be far away.
 struct Emission {
-  Vec3d origin{0.0};      ///< local space [m]
+  Vec3d origin{0.0};      ///< local space [m]; the light itself, or a point on the way from it
+                          ///< to the smoke (disc before the sphere, end of a long way)
   Vec3f direction{0.0f};  ///< unit
   Rgb power{0.0f};        ///< [W] when one photon is emitted; divide by the count
 };
@@ -52,10 +53,14 @@ class Light {
   /// Power that reaches the bounding sphere when nothing is in the way [W], per channel: what
   /// photon emission draws from. Zero for a light that cannot reach it.
   virtual Rgb power(const BoundingSphere& bounds) const = 0;
-  /// Draws a photon that enters the bounding sphere, or starts inside it. E[power] = power(bounds).
+  /// Draws a photon that enters the bounding sphere, or starts inside it. E[power] = power(bounds);
+  /// a photon of power 0 (outside the cone of a spot) need not enter. Thread-safe; same bits on
+  /// every CPU.
   /// @param u  four uniform numbers in [0, 1)
   virtual Emission emit(const BoundingSphere& bounds, const Vec4f& u) const = 0;
-  /// Illumination of a point. Lights without extent ignore `u`. Thread-safe.
+  /// Illumination of a point. Lights without extent ignore `u`. Finite everywhere: 1/d^2 of a point
+  /// or spot light stops growing at the rounding of a float position (1e-7 of the light's distance
+  /// from the origin, at least 1e-9 m), and is 0 at the light itself. Thread-safe.
   virtual Illumination illuminate(const Vec3f& point, const Vec2f& u) const = 0;
   /// True for a light without extent or spread of directions: `illuminate` is exact.
   virtual bool isDelta() const = 0;
@@ -77,6 +82,9 @@ struct LightPlugin {
   std::span<const Param> params;
   std::unique_ptr<Light> (*create)(const ParamValues& values, const LocalSpace& space);
 };
+
+/// Options common to all lights: `name`.
+std::span<const Param> lightParams();
 
 /// Every light (generated).
 std::span<const LightPlugin* const> lightModels();

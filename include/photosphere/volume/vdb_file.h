@@ -34,8 +34,16 @@ struct VdbFile {
 /// @throws InputMissingError, InputError
 VdbFile readVdb(const std::filesystem::path& path);
 
-/// Writes grids as one .vdb, whole or not at all: by io::Stream on a stream that throws on a write
-/// error (File::write hides them), reopened and its header checked, flushed, renamed.
+/// Whether readVdb would read the file, found out in a child process under limits of memory (4 GiB
+/// and 128 times the file's size) and CPU seconds (20 and one for each 10 MB), so that a damaged
+/// file can hurt nothing. Call it from a process whose other threads are idle: it forks.
+/// @param reason  why not, with the file's name; empty when true
+bool probeVdb(const std::filesystem::path& path, std::string& reason);
+
+/// Writes grids as one .vdb, whole or not at all: by OpenVDB's archive on a stream that throws on a
+/// write error (io::File::write hides them), its descriptors walked again, flushed, renamed. The
+/// file has grid offsets, so that other software can load single grids of it; grids marked half
+/// float stay so; blosc where the library has it.
 /// @throws OutputError
 void writeVdb(const std::filesystem::path& path, const std::vector<Grid>& grids,
               const std::map<std::string, std::string>& metadata = {});

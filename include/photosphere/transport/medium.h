@@ -1,0 +1,110 @@
+#pragma once
+// The participating medium of a frame: any number of overlapping volumes whose coefficients add.
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "photosphere/core/types.h"
+#include "photosphere/phase/phase.h"
+#include "photosphere/volume/bricks.h"
+#include "photosphere/volume/majorant_grid.h"
+
+namespace photosphere::transport {
+
+/// Distinct phase functions one medium may mix. Volumes with equal phase share one.
+inline constexpr int kMaxPhases = 8;
+
+/// One volume, placed in local space (lights/light.h, LocalSpace).
+struct MediumVolume {
+  std::string name;
+  volume::BrickField<float> density;
+  Mat4d localFromNode{1.0};   ///< node position of `density` to local space [m]
+  double densityScale = 1.0;  ///< extinction per unit of density [1/m]
+  Rgb albedo{0.9f};           ///< used where no albedo grid is given
+  std::vector<volume::BrickField<float>> albedoFields;  ///< none, one (grey) or three
+  Mat4d localFromAlbedoNode{1.0};
+  phase::HenyeyGreenstein phase{0.0};
+};
+
+/// Coefficients at a point.
+struct Coefficients {
+  float extinction = 0.0f;                     ///< sigma_t [1/m]
+  std::array<Rgb, kMaxPhases> scattering{};    ///< sigma_s of each distinct phase function [1/m]
+  Rgb totalScattering(int phases) const {
+    Rgb sum(0.0f);
+    for (int i = 0; i < phases; ++i) sum += scattering[static_cast<std::size_t>(i)];
+    return sum;
+  }
+};
+
+/// Immutable; reading is thread-safe. All positions in local space [m], directions unit.
+class Medium {
+ public:
+  /// @throws ConfigError when the volumes have more than kMaxPhases distinct phase functions
+  explicit Medium(std::vector<MediumVolume> volumes);
+
+  /// sigma_t [1/m].
+  float extinction(const Vec3f& p) const {
+    float sum = 0.0f;
+    for (const Placed& v : m_placed) sum += v.scale * v.field->sample(v.nodeFromLocal(p));
+    return sum;
+  }
+  /// All coefficients at a point.
+  void coefficients(const Vec3f& p, Coefficients& out) const;
+
+  /// The albedo, where one number (or colour) holds everywhere; nullptr where it varies.
+  const Rgb* uniformAlbedo() const { return m_uniformAlbedo ? &m_albedo.front().constant : nullptr; }
+  /// Distinct phase functions, in order of first use.
+  const std::vector<phase::HenyeyGreenstein>& phases() const { return m_phases; }
+  const volume::MajorantGrid& majorants() const { return m_majorants; }
+  /// Tight box around all extinction; empty when there is none.
+  const Box3d& bounds() const { return m_majorants.bounds(); }
+  /// Smallest voxel edge of all volumes [m].
+  double voxelEdge() const { return m_voxelEdge; }
+  /// True when every albedo has equal channels.
+  bool isGrey() const { return m_grey; }
+  /// Largest albedo of any channel anywhere.
+  float maximumAlbedo() const { return m_maximumAlbedo; }
+  const std::vector<MediumVolume>& volumes() const { return m_volumes; }
+  /// Hash of everything that light transport depends on, as 16 hex digits.
+  const std::string& hash() const { return m_hash; }
+  std::uint64_t memoryBytes() const;
+
+ private:
+  // What the lookup loop reads, compact.
+  struct Placed {
+    const volume::BrickField<float>* field;
+    Vec3f column0, column1, column2, offset;  // node = column * local + offset
+    float scale;
+    int phaseIndex;
+    Vec3f nodeFromLocal(const Vec3f& p) const {
+      return column0 * p.x + column1 * p.y + column2 * p.z + offset;
+    }
+  };
+  struct Albedo {
+    Rgb constant{0.0f};
+    std::vector<Placed> fields;
+    Rgb at(const Vec3f& p) const;
+  };
+
+  static Placed place(const volume::BrickField<float>& field, const Mat4d& localFromNode,
+                      double scale, int phaseIndex);
+
+  std::vector<MediumVolume> m_volumes;
+  std::vector<Placed> m_placed;
+  std::vector<Albedo> m_albedo;
+  std::vector<phase::HenyeyGreenstein> m_phases;
+  volume::MajorantGrid m_majorants;
+  double m_voxelEdge = 1.0;
+  bool m_grey = true;
+  bool m_uniformAlbedo = false;
+  float m_maximumAlbedo = 0.0f;
+  std::string m_hash;
+};
+
+/// Part of a ray inside a box. @return false when it misses
+bool clip(const Box3d& box, const Vec3d& origin, const Vec3d& direction, double& t0, double& t1);
+
+}  // namespace photosphere::transport

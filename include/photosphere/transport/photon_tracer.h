@@ -1,0 +1,72 @@
+#pragma once
+// Photon tracing into a sink (Min & Ihm 2010, section 4.1, figure 3): lamps emit photons of equal power,
+// each flies, collides, is absorbed or scattered by Russian roulette, one direction per event.
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "photosphere/core/rng.h"
+#include "photosphere/lights/light.h"
+#include "photosphere/transport/medium.h"
+
+namespace photosphere::transport {
+
+using LightList = std::vector<std::unique_ptr<lights::Light>>;
+
+/// One straight flight of a photon, from real collision (or entry) to real collision (or exit).
+/// Local space.
+struct Flight {
+  Vec3f origin{0.0f};
+  float length = 0.0f;            ///< inside the medium's bounds [m]
+  Vec3f direction{0.0f};          ///< unit
+  float extinctionAtEnd = 0.0f;   ///< sigma_t at the collision [1/m]; 0 = the photon left
+  Rgb power{0.0f};                ///< whole power P per photon [W]: divide by the photon count
+  std::uint32_t scatterings = 0;  ///< events before this flight; 0 = as the lamp sent it
+  std::uint32_t light = 0;        ///< index of the lamp
+  std::uint64_t photon = 0;       ///< index over all photons of the frame
+  std::uint32_t ordinal = 0;      ///< number of this flight among the photon's
+  bool collided() const { return extinctionAtEnd > 0.0f; }
+};
+
+/// Takes flights; called from many threads at once with disjoint batches.
+class FlightSink {
+ public:
+  virtual ~FlightSink() = default;
+  virtual void consume(std::span<const Flight> flights) = 0;
+};
+
+struct TraceOptions {
+  std::uint64_t photons = 1'000'000;   ///< of the whole frame, over all lights
+  std::uint64_t firstPhoton = 0;       ///< of this shard
+  std::uint64_t photonCount = ~0ull;   ///< of this shard; clipped to the frame's
+  RandomKey key;
+};
+
+/// What became of the photons. Powers are per channel [W] of the whole frame's lamps.
+struct TraceStatistics {
+  std::uint64_t photons = 0;      ///< emitted in this run
+  std::uint64_t scatterings = 0;
+  std::uint64_t flights = 0;
+  std::uint64_t capped = 0;       ///< photons ended by the roulette after kLongPath events
+  std::uint64_t majorantViolations = 0;
+  Vec3d emitted{0.0}, missed{0.0}, absorbed{0.0}, escaped{0.0}, cappedPower{0.0};
+  /// emitted - missed - absorbed - escaped - capped: zero up to rounding.
+  Vec3d imbalance() const { return emitted - missed - absorbed - escaped - cappedPower; }
+};
+
+/// Events after which a path must pass a roulette of survival 0.999 at each further one (METHOD,
+/// section 6): unbiased, and ends paths that albedo 1 would never end.
+inline constexpr std::uint32_t kLongPath = 10'000;
+
+/// Traces photons of all lights, chosen in proportion to their power, and hands every flight to the
+/// sink. Deterministic in everything but the order in which batches reach the sink.
+/// @throws InterruptedError
+TraceStatistics tracePhotons(const Medium& medium, const LightList& lights,
+                             const TraceOptions& options, FlightSink& sink);
+
+/// Sphere around the medium's bounds: what photons are aimed at.
+lights::BoundingSphere boundingSphere(const Medium& medium);
+
+}  // namespace photosphere::transport

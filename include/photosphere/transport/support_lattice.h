@@ -1,0 +1,105 @@
+#pragma once
+// A sparse axis-aligned lattice of cubic voxels over the smoke and a margin around it: where light is
+// stored and shadows are tabulated.
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "photosphere/transport/medium.h"
+
+namespace photosphere::transport {
+
+/// Active voxels are those that the medium's extinction can reach, dilated by a margin. They are kept
+/// in bricks of 8^3 and numbered consecutively, brick by brick, x fastest inside a brick. Local space.
+class SupportLattice {
+ public:
+  SupportLattice() = default;
+  /// @param edge     voxel edge [m]
+  /// @param margin   dilation in voxels, >= 0, along each axis
+  /// @throws MemoryError when the brick table alone would pass 4 GiB
+  SupportLattice(const Medium& medium, double edge, int margin);
+  /// Rebuilds a lattice from its placement and the coordinates of its active voxels, in their order.
+  SupportLattice(const Vec3d& origin, double edge, const Vec3i& bricks,
+                 const std::vector<Vec3i>& active);
+
+  double edge() const { return m_edge; }
+  /// Lower corner of voxel (0,0,0), local space [m].
+  const Vec3d& origin() const { return m_origin; }
+  const Vec3i& bricks() const { return m_bricks; }
+  std::size_t size() const { return m_voxels.size(); }
+  /// Coordinates of the active voxel of that number.
+  const Vec3i& voxel(std::size_t number) const { return m_voxels[number]; }
+  Vec3f center(std::size_t number) const {
+    return Vec3f(m_origin + (Vec3d(m_voxels[number]) + 0.5) * m_edge);
+  }
+  /// Number of a voxel, or -1 where it is inactive or outside.
+  std::int32_t number(const Vec3i& v) const {
+    const Vec3i b(v.x >> 3, v.y >> 3, v.z >> 3);
+    if (b.x < 0 || b.y < 0 || b.z < 0 || b.x >= m_bricks.x || b.y >= m_bricks.y || b.z >= m_bricks.z)
+      return -1;
+    const std::int32_t brick = m_table[tableIndex(b)];
+    if (brick < 0) return -1;
+    return m_numbers[static_cast<std::size_t>(brick) * 512 +
+                     static_cast<std::size_t>((v.z & 7) * 64 + (v.y & 7) * 8 + (v.x & 7))];
+  }
+  /// Coordinates of the bricks that hold an active voxel.
+  const std::vector<Vec3i>& activeBricks() const { return m_activeBricks; }
+  std::uint64_t memoryBytes() const;
+
+  /// Calls visit(number, distance to entry, length) for every active voxel that a flight crosses, in
+  /// order (exact clipping, Amanatides & Woo 1987). `from` in local space, `d` unit, length [m].
+  template <class Visit>
+  void walk(const Vec3f& from, const Vec3f& d, float length, const Visit& visit) const;
+
+ private:
+  std::size_t tableIndex(const Vec3i& b) const {
+    return (static_cast<std::size_t>(b.z) * static_cast<std::size_t>(m_bricks.y) +
+            static_cast<std::size_t>(b.y)) *
+               static_cast<std::size_t>(m_bricks.x) +
+           static_cast<std::size_t>(b.x);
+  }
+  void number();
+
+  Vec3d m_origin{0.0};
+  double m_edge = 1.0;
+  float m_inverseEdge = 1.0f;
+  Vec3f m_originF{0.0f};
+  Vec3i m_bricks{0};
+  std::vector<std::int32_t> m_table;     // brick number by brick coordinates
+  std::vector<std::int32_t> m_numbers;   // 512 voxel numbers a brick
+  std::vector<Vec3i> m_activeBricks;
+  std::vector<Vec3i> m_voxels;
+};
+
+template <class Visit>
+void SupportLattice::walk(const Vec3f& from, const Vec3f& d, float length, const Visit& visit) const {
+  // Everything in voxel units: u(t) = start + d t, t in voxels.
+  const Vec3f start = (from - m_originF) * m_inverseEdge;
+  const float edge = static_cast<float>(m_edge);
+  const float end = length * m_inverseEdge;
+  Vec3i cell(static_cast<int>(std::floor(start.x)), static_cast<int>(std::floor(start.y)),
+             static_cast<int>(std::floor(start.z)));
+  Vec3i step;
+  Vec3f next, delta;
+  for (int a = 0; a < 3; ++a) {
+    step[a] = d[a] > 0 ? 1 : -1;
+    const float inverse = 1.0f / d[a];
+    delta[a] = d[a] != 0 ? std::abs(inverse) : kInfinity;
+    next[a] = d[a] != 0
+                  ? glm::max(0.0f, (static_cast<float>(cell[a] + (d[a] > 0 ? 1 : 0)) - start[a]) * inverse)
+                  : kInfinity;
+  }
+  float t = 0.0f;
+  while (t < end) {
+    const int a = next.x < next.y ? (next.x < next.z ? 0 : 2) : (next.y < next.z ? 1 : 2);
+    const float exit = glm::min(next[a], end);
+    const std::int32_t n = number(cell);
+    if (n >= 0 && exit > t) visit(static_cast<std::size_t>(n), t * edge, (exit - t) * edge);
+    t = exit;
+    next[a] += delta[a];
+    cell[a] += step[a];
+  }
+}
+
+}  // namespace photosphere::transport

@@ -1,0 +1,103 @@
+#pragma once
+// The render-time sampler: a sparse lattice of values in bricks that carry their own apron, so that a
+// trilinear lookup reads one brick and never asks a tree.
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "photosphere/core/types.h"
+#include "photosphere/volume/grid.h"
+
+namespace photosphere::volume {
+
+/// Sparse lattice of values of type T (float or Vec4f). Node (0,0,0) lies at index `origin()` of the
+/// lattice's own index space; positions passed to `sample` count nodes from there. Nodes outside every
+/// brick are zero. Immutable after construction; reading is thread-safe.
+template <class T>
+class BrickField {
+ public:
+  static constexpr int kEdge = 8;               ///< voxel cells per brick edge
+  static constexpr int kNodes = kEdge + 1;      ///< nodes per brick edge, apron included
+  static constexpr int kBrickSize = kNodes * kNodes * kNodes;
+
+  BrickField() = default;
+
+  /// Builds from candidate bricks. Empty bricks are dropped and bricks of one constant value share
+  /// storage, so tiles are never densified.
+  /// @param origin      index of node (0,0,0)
+  /// @param bricks      extent in bricks
+  /// @param candidates  brick coordinates that may hold anything but zero, each once
+  /// @param fetch       fills the 9^3 nodes of a brick, x fastest; called from many threads
+  BrickField(const Vec3i& origin, const Vec3i& bricks, const std::vector<Vec3i>& candidates,
+             const std::function<void(const Vec3i& brick, T* nodes)>& fetch);
+
+  /// Trilinear value at a position in nodes from the origin; zero outside.
+  T sample(const Vec3f& p) const {
+    // Written so that NaN fails every test.
+    if (!(p.x >= 0.0f && p.y >= 0.0f && p.z >= 0.0f && p.x < m_extent.x && p.y < m_extent.y &&
+          p.z < m_extent.z))
+      return T(0.0f);
+    const int x = static_cast<int>(p.x), y = static_cast<int>(p.y), z = static_cast<int>(p.z);
+    const std::int32_t brick = m_table[tableIndex(x >> 3, y >> 3, z >> 3)];
+    if (brick < 0) return T(0.0f);
+    const T* n = m_nodes.data() + static_cast<std::size_t>(brick) * kBrickSize +
+                 ((z & 7) * kNodes + (y & 7)) * kNodes + (x & 7);
+    const float fx = p.x - static_cast<float>(x);
+    const float fy = p.y - static_cast<float>(y);
+    const float fz = p.z - static_cast<float>(z);
+    constexpr int dy = kNodes, dz = kNodes * kNodes;
+    const T c00 = n[0] + (n[1] - n[0]) * fx;
+    const T c10 = n[dy] + (n[dy + 1] - n[dy]) * fx;
+    const T c01 = n[dz] + (n[dz + 1] - n[dz]) * fx;
+    const T c11 = n[dz + dy] + (n[dz + dy + 1] - n[dz + dy]) * fx;
+    const T c0 = c00 + (c10 - c00) * fy;
+    const T c1 = c01 + (c11 - c01) * fy;
+    return c0 + (c1 - c0) * fz;
+  }
+
+  const Vec3i& origin() const { return m_origin; }
+  const Vec3i& bricks() const { return m_bricks; }
+  bool empty() const { return m_nodes.empty(); }
+  /// Brick storage index at brick coordinates; -1 = all zero.
+  std::int32_t brickAt(const Vec3i& b) const { return m_table[tableIndex(b.x, b.y, b.z)]; }
+  const T* nodes(std::int32_t brick) const {
+    return m_nodes.data() + static_cast<std::size_t>(brick) * kBrickSize;
+  }
+  bool isConstant(std::int32_t brick) const { return m_constant[static_cast<std::size_t>(brick)] != 0; }
+  std::uint64_t memoryBytes() const {
+    return m_table.size() * sizeof(std::int32_t) + m_nodes.size() * sizeof(T) + m_constant.size();
+  }
+
+ private:
+  std::size_t tableIndex(int bx, int by, int bz) const {
+    return (static_cast<std::size_t>(bz) * static_cast<std::size_t>(m_bricks.y) +
+            static_cast<std::size_t>(by)) *
+               static_cast<std::size_t>(m_bricks.x) +
+           static_cast<std::size_t>(bx);
+  }
+
+  Vec3i m_origin{0};
+  Vec3i m_bricks{0};
+  Vec3f m_extent{0.0f};
+  std::vector<std::int32_t> m_table;
+  std::vector<T> m_nodes;
+  std::vector<std::uint8_t> m_constant;
+};
+
+extern template class BrickField<float>;
+extern template class BrickField<Vec4f>;
+
+/// A scalar grid, or one component of a vector grid, as bricks. Inactive voxels count as zero.
+/// @param component  0 to 2 for a vector grid, 0 for a scalar grid
+/// @throws InputError when the grid is neither, or holds a NaN, infinite or (unless allowed) negative
+///         value: it names the grid and the first such voxel; MemoryError when the table alone would
+///         pass `budgetBytes` (0 = no budget)
+BrickField<float> bricksFromGrid(const Grid& grid, int component, const std::string& path,
+                                 bool allowNegative, std::uint64_t budgetBytes);
+
+}  // namespace photosphere::volume

@@ -1,0 +1,91 @@
+#include "photosphere/image/load.h"
+
+#include <OpenImageIO/imageio.h>
+#include <fmt/format.h>
+
+#include <fstream>
+
+#include "photosphere/core/error.h"
+#include "photosphere/core/resources.h"
+#include "photosphere/image/exr.h"
+
+namespace photosphere::image {
+namespace {
+
+constexpr std::uint32_t kExrMagic = 20000630;
+
+/// Flat regions compress best in deflate, at 1032 to 1; a file that claims much more is damaged.
+constexpr std::uint64_t kLargestRatio = 2000;
+
+std::uint64_t checkedSize(const std::string& name) {
+  std::error_code error;
+  std::ifstream in(name, std::ios::binary);
+  if (!in || !std::filesystem::is_regular_file(name, error))
+    throw InputMissingError(name, "cannot open this file; check its name and permissions");
+  return std::filesystem::file_size(name);
+}
+
+bool isExr(const std::string& name) {
+  std::uint32_t magic = 0;
+  std::ifstream in(name, std::ios::binary);
+  in.read(reinterpret_cast<char*>(&magic), sizeof(magic));
+  return magic == kExrMagic;
+}
+
+LoadedImage fromExr(const std::string& name) {
+  ExrFile file = readExr(name);
+  const char* const sources[] = {"R", "G", "B"};
+  const bool grey = !file.image.has("R") && file.image.has("Y");
+  LoadedImage loaded{Image(file.image.dataWindow(), file.image.displayWindow()), "linear"};
+  for (const char* source : sources) {
+    const Channel* channel = file.image.find(grey ? "Y" : source);
+    if (!channel)
+      throw InputError(name, fmt::format("has no channel {}; save it with R, G and B", source));
+    const std::span<float> pixels = loaded.image.addChannel(source, ChannelKind::color);
+    std::copy(channel->pixels.begin(), channel->pixels.end(), pixels.begin());
+  }
+  return loaded;
+}
+
+void checkSpec(const std::string& name, const OIIO::ImageSpec& spec, std::uint64_t fileSize) {
+  if (spec.width < 1 || spec.height < 1 || spec.nchannels < 1 || spec.depth > 1)
+    throw InputError(name, "holds no flat picture");
+  const auto pixels =
+      static_cast<std::uint64_t>(spec.width) * static_cast<std::uint64_t>(spec.height);
+  if (pixels * spec.pixel_bytes(true) / kLargestRatio > fileSize)
+    throw InputError(name, fmt::format("claims {}x{} pixels, more than {} bytes can hold",
+                                       spec.width, spec.height, fileSize));
+  const std::uint64_t needed = pixels * 4 * (static_cast<std::uint64_t>(spec.nchannels) + 3);
+  if (needed > availableMemoryBytes())
+    throw MemoryError(fmt::format("{}: its pixels need {}, but {} of memory are free", name,
+                                  formatBytes(needed), formatBytes(availableMemoryBytes())));
+}
+
+}  // namespace
+
+LoadedImage loadImage(const std::filesystem::path& path) {
+  const std::string name = path.string();
+  const std::uint64_t fileSize = checkedSize(name);
+  // Our own reader checks more.
+  if (isExr(name)) return fromExr(name);
+
+  const auto input = OIIO::ImageInput::open(name);
+  if (!input) throw InputError(name, "is not a picture that can be read: " + OIIO::geterror());
+  const OIIO::ImageSpec& spec = input->spec();
+  checkSpec(name, spec, fileSize);
+  const auto channels = static_cast<std::size_t>(spec.nchannels);
+  std::vector<float> pixels(static_cast<std::size_t>(spec.image_pixels()) * channels);
+  if (!input->read_image(0, 0, 0, spec.nchannels, OIIO::TypeDesc::FLOAT, pixels.data()))
+    throw InputError(name, "is damaged: " + input->geterror());
+
+  LoadedImage loaded{Image(spec.width, spec.height), spec.get_string_attribute("oiio:ColorSpace")};
+  for (std::size_t c = 0; c < 3; ++c) {
+    const std::span<float> plane = loaded.image.addChannel(std::string(1, "RGB"[c]));
+    const std::size_t source = channels >= 3 ? c : 0;  // grey, or grey and alpha
+    for (std::size_t i = 0; i < plane.size(); ++i)
+      plane[i] = pixels[i * channels + source];
+  }
+  return loaded;
+}
+
+}  // namespace photosphere::image

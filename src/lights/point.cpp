@@ -1,0 +1,62 @@
+// Shines alike into all directions from one point.
+
+#include "cone.h"
+#include "rows.h"
+
+namespace photosphere::lights::plugins {
+
+namespace {
+
+class PointLight final : public Light {
+ public:
+  PointLight(const Vec3d& position, const Rgb& intensity)
+      : m_position(position), m_intensity(intensity) {}
+
+  Rgb power(const BoundingSphere& bounds) const override {
+    return m_intensity * static_cast<float>(coneToward(m_position, bounds).solidAngle());
+  }
+
+  Emission emit(const BoundingSphere& bounds, const Vec4f& u) const override {
+    const Cone cone = coneToward(m_position, bounds);
+    const Vec3d direction =
+        directionInCone(cone.axis, static_cast<double>(u.x) * cone.oneMinusCos, u.y);
+    return {photonOrigin(m_position, direction, bounds), Vec3f(direction),
+            m_intensity * static_cast<float>(cone.solidAngle())};
+  }
+
+  Illumination illuminate(const Vec3f& point, const Vec2f&) const override {
+    Vec3d direction;
+    return illuminateFromPoint(m_position, m_intensity, point, direction);
+  }
+
+  bool isDelta() const override { return true; }
+  bool isGrey() const override { return isGreyColor(m_intensity); }
+
+ private:
+  Vec3d m_position;  // local space [m]
+  Rgb m_intensity;   // [W/sr]
+};
+
+constexpr Param params[] = {
+    positionRow("of the light"),
+    colorRow(),
+    intensityRow("W/sr", "in every direction"),
+    softRadiusRow(),
+};
+
+std::unique_ptr<Light> create(const ParamValues& values, const LocalSpace& space) {
+  return std::make_unique<PointLight>(space.localFromWorld(values.vec3("position")),
+                                      scaledColor(values));
+}
+
+}  // namespace
+
+extern const LightPlugin point;
+const LightPlugin point = {
+    .name = "point",
+    .help = "a point that shines alike into all directions",
+    .params = params,
+    .create = create,
+};
+
+}  // namespace photosphere::lights::plugins

@@ -1,0 +1,156 @@
+#include <algorithm>
+
+#include "photosphere/render/integrator.h"
+#include "photosphere/transport/scatter.h"
+
+namespace photosphere::render {
+
+namespace {
+
+using transport::Coefficients;
+using transport::Collision;
+using transport::Medium;
+using transport::Segment;
+
+class PathIntegrator final : public Integrator {
+ public:
+  PathIntegrator(const Medium& medium, const transport::LightList& lights, const PathOptions& options)
+      : m_medium(medium), m_options(options) {
+    for (const auto& light : lights) {
+      m_backgrounds.push_back(light.get());
+      const bool sampled =
+          light->isDelta() || options.environment == EnvironmentSampling::nextEvent;
+      if (sampled) m_sampled.push_back(light.get());
+    }
+    const lights::BoundingSphere bounds = transport::boundingSphere(medium);
+    double sum = 0;
+    for (const lights::Light* light : m_sampled) {
+      sum += std::max(0.0, maxComponent(Vec3d(light->power(bounds))));
+      m_cumulative.push_back(sum);
+    }
+    for (double& c : m_cumulative) c = sum > 0 ? c / sum : 0;
+    if (!(sum > 0)) m_sampled.clear();
+  }
+
+  RayRadiance radiance(const Vec3d& origin, const Vec3f& direction, Rng& rng,
+                       IntegratorCounters& counters) const override {
+    RayRadiance result;
+    Segment segment = transport::clipToMedium(m_medium, origin, direction,
+                                              std::numeric_limits<double>::infinity());
+    result.transmittance =
+        segment.length > 0.0f
+            ? Rgb(transport::trackTransmittance(m_medium, segment.origin, segment.direction,
+                                                segment.length, rng, counters.tracking))
+            : Rgb(1.0f);
+    Rgb throughput(1.0f);
+    for (int scatterings = 0;; ++scatterings) {
+      const Collision hit = segment.length > 0.0f
+                                ? transport::sampleCollision(m_medium, segment.origin, segment.direction,
+                                                             segment.length, rng, counters.tracking)
+                                : Collision{};
+      if (!hit.happened()) {
+        const Vec3f d = scatterings == 0 ? direction : segment.direction;
+        addEscape(result, throughput, d, scatterings);
+        return result;
+      }
+      if (scatterings == 0) {
+        result.depth = static_cast<float>(segment.begin) + hit.distance;
+        result.opacity = 1.0f;
+      }
+      ++counters.scatterings;
+      const Vec3f p = segment.origin + segment.direction * hit.distance;
+      if (!m_options.effects.singleScattering && !m_options.effects.multipleScattering) return result;
+      if (m_options.maxScatter > 0 && scatterings >= m_options.maxScatter) {
+        ++counters.capped;
+        counters.cappedRadiance += static_cast<double>(meanComponent(throughput));
+        return result;
+      }
+      addNextEvent(result, throughput, p, segment.direction, scatterings, rng, counters);
+      const transport::ScatterEvent event = transport::scatter(m_medium, p, segment.direction, rng);
+      if (!event.survived) return result;
+      throughput *= event.weight;
+      if (static_cast<std::uint32_t>(scatterings) >= transport::kLongPath) {
+        if (!(rng.uniform() < 0.999f)) return result;
+        throughput *= 1.0f / 0.999f;
+      }
+      segment = transport::clipToMedium(m_medium, Vec3d(p), event.direction,
+                                        std::numeric_limits<double>::infinity());
+      segment.direction = event.direction;
+      segment.begin = 0.0;
+    }
+  }
+
+ private:
+  static void add(RayRadiance& result, const Rgb& value, int scatterings) {
+    (scatterings == 1 ? result.single : result.multiple) += value;
+  }
+
+  // Light that the path meets by leaving the smoke after this many scatterings.
+  void addEscape(RayRadiance& result, const Rgb& throughput, const Vec3f& d, int scatterings) const {
+    if (scatterings > 0 && m_options.environment == EnvironmentSampling::nextEvent) return;
+    for (const lights::Light* light : m_backgrounds) {
+      const Rgb value = throughput * light->background(d);
+      if (scatterings == 0)
+        result.background += value;
+      else
+        add(result, value, scatterings);
+    }
+  }
+
+  // Light of one lamp, chosen by power, that scatters here toward the eye.
+  void addNextEvent(RayRadiance& result, const Rgb& throughput, const Vec3f& p, const Vec3f& d,
+                    int scatterings, Rng& rng, IntegratorCounters& counters) const {
+    if (m_sampled.empty()) return;
+    std::size_t i = 0;
+    double probability = 1.0;
+    if (m_sampled.size() > 1) {
+      const double u = rng.uniformDouble();
+      i = static_cast<std::size_t>(std::upper_bound(m_cumulative.begin(), m_cumulative.end(), u) -
+                                   m_cumulative.begin());
+      i = std::min(i, m_sampled.size() - 1);
+      probability = m_cumulative[i] - (i ? m_cumulative[i - 1] : 0.0);
+    }
+    const lights::Light& light = *m_sampled[i];
+    const Vec2f u = light.isDelta() ? Vec2f(0.5f) : rng.uniform2();
+    const lights::Illumination in = light.illuminate(p, u);
+    if (!(maxComponent(in.irradiance) > 0.0f)) return;
+    const Rgb scattered = phaseAlbedo(p, in.direction, -d);
+    const Segment toLight = transport::clipToMedium(m_medium, Vec3d(p), -in.direction,
+                                                    static_cast<double>(in.distance));
+    const float transmittance =
+        toLight.length > 0.0f && m_options.effects.shadows
+            ? transport::trackTransmittance(m_medium, toLight.origin, toLight.direction,
+                                            toLight.length, rng, counters.tracking)
+            : 1.0f;
+    add(result,
+        throughput * scattered * in.irradiance * (transmittance / static_cast<float>(probability)),
+        scatterings + 1);
+  }
+
+  // Sum over phase functions of sigma_s / sigma_t times the phase.
+  Rgb phaseAlbedo(const Vec3f& p, const Vec3f& wi, const Vec3f& wo) const {
+    const auto& phases = m_medium.phases();
+    if (const Rgb* uniform = m_medium.uniformAlbedo()) return *uniform * phases[0].evaluate(wi, wo);
+    Coefficients c;
+    m_medium.coefficients(p, c);
+    Rgb sum(0.0f);
+    for (std::size_t i = 0; i < phases.size(); ++i) sum += c.scattering[i] * phases[i].evaluate(wi, wo);
+    return c.extinction > 0.0f ? sum / c.extinction : Rgb(0.0f);
+  }
+
+  const Medium& m_medium;
+  PathOptions m_options;
+  std::vector<const lights::Light*> m_sampled;      // lamps of next-event estimation
+  std::vector<const lights::Light*> m_backgrounds;  // every lamp: what escaping rays meet
+  std::vector<double> m_cumulative;
+};
+
+}  // namespace
+
+std::unique_ptr<Integrator> makePathIntegrator(const Medium& medium,
+                                               const transport::LightList& lights,
+                                               const PathOptions& options) {
+  return std::make_unique<PathIntegrator>(medium, lights, options);
+}
+
+}  // namespace photosphere::render

@@ -1,0 +1,80 @@
+#include "photosphere/render/shadows.h"
+
+#include "photosphere/core/log.h"
+#include "photosphere/core/resources.h"
+#include "photosphere/transport/support_lattice.h"
+
+namespace photosphere::render {
+
+using transport::Medium;
+using transport::Segment;
+using Field = volume::BrickField<float>;
+
+Shadows::Shadows(const Medium& medium, const transport::LightList& lights, ShadowMode mode,
+                 float step, std::uint64_t budgetBytes)
+    : m_medium(&medium), m_mode(mode), m_step(step), m_tables(lights.size()) {
+  if (mode != ShadowMode::grid || medium.bounds().empty()) return;
+  const double pitch = medium.voxelEdge();
+  const transport::SupportLattice lattice(medium, pitch, 0);
+  const std::uint64_t bytes = lattice.activeBricks().size() * Field::kBrickSize * sizeof(float);
+  for (std::size_t i = 0; i < lights.size(); ++i) {
+    if (!lights[i]->isDelta()) continue;
+    if (budgetBytes && memoryBytes() + bytes > budgetBytes) {
+      log::warning(
+          "light '{}': its shadow grid of {} passes the memory budget; its shadows are marched "
+          "instead (render.shadow = \"march\"), which is slower",
+          lights[i]->name(), formatBytes(bytes));
+      continue;
+    }
+    const lights::Light& light = *lights[i];
+    auto fetch = [&](const Vec3i& brick, float* depth) {
+      bool lit = false;
+      for (int z = 0; z < Field::kNodes; ++z)
+        for (int y = 0; y < Field::kNodes; ++y)
+          for (int x = 0; x < Field::kNodes; ++x) {
+            const Vec3d node(brick.x * 8 + x, brick.y * 8 + y, brick.z * 8 + z);
+            const Vec3d p = lattice.origin() + node * pitch;
+            const lights::Illumination in = light.illuminate(Vec3f(p), Vec2f(0.5f));
+            lit = lit || maxComponent(in.irradiance) > 0.0f;
+            const Segment toLight =
+                transport::clipToMedium(medium, p, -in.direction, static_cast<double>(in.distance));
+            *depth++ = toLight.length > 0.0f
+                           ? transport::marchOpticalDepth(medium, toLight.origin, toLight.direction,
+                                                          toLight.length, m_step)
+                           : 0.0f;
+          }
+      // No node of this brick sees the lamp, so nothing in it is ever looked up with a weight.
+      if (!lit) std::fill_n(depth - Field::kBrickSize, Field::kBrickSize, 0.0f);
+    };
+    Table table;
+    table.opticalDepth = Field(Vec3i(0), lattice.bricks(), lattice.activeBricks(), fetch);
+    table.origin = Vec3f(lattice.origin());
+    table.inversePitch = static_cast<float>(1.0 / pitch);
+    m_tables[i] = std::move(table);
+  }
+}
+
+float Shadows::transmittance(std::size_t light, const Vec3f& p, const Vec3f& direction,
+                             float distance, Rng& rng,
+                             transport::TrackingCounters& counters) const {
+  // The optical depth is interpolated, not the transmittance: it is linear where smoke is even.
+  if (const std::optional<Table>& table = m_tables[light])
+    return fastExp(-table->opticalDepth.sample((p - table->origin) * table->inversePitch));
+  const Segment toLight =
+      transport::clipToMedium(*m_medium, Vec3d(p), -direction, static_cast<double>(distance));
+  if (!(toLight.length > 0.0f)) return 1.0f;
+  if (m_mode == ShadowMode::track)
+    return transport::trackTransmittance(*m_medium, toLight.origin, toLight.direction,
+                                         toLight.length, rng, counters);
+  return fastExp(-transport::marchOpticalDepth(*m_medium, toLight.origin, toLight.direction,
+                                               toLight.length, m_step));
+}
+
+std::uint64_t Shadows::memoryBytes() const {
+  std::uint64_t bytes = 0;
+  for (const auto& table : m_tables)
+    if (table) bytes += table->opticalDepth.memoryBytes();
+  return bytes;
+}
+
+}  // namespace photosphere::render

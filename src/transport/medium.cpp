@@ -1,0 +1,128 @@
+#include "photosphere/transport/medium.h"
+
+#include <fmt/format.h>
+
+#include "photosphere/core/error.h"
+#include "photosphere/core/hash.h"
+
+namespace photosphere::transport {
+
+namespace {
+
+void hashField(Hasher& hasher, const volume::BrickField<float>& field, const Mat4d& placement) {
+  hasher.numbers(&placement[0][0], 16);
+  const Vec3i& bricks = field.bricks();
+  hasher.numbers(&bricks.x, 3);
+  for (int z = 0; z < bricks.z; ++z)
+    for (int y = 0; y < bricks.y; ++y)
+      for (int x = 0; x < bricks.x; ++x) {
+        const std::int32_t brick = field.brickAt({x, y, z});
+        if (brick < 0) continue;
+        const Vec3i at(x, y, z);
+        hasher.numbers(&at.x, 3);
+        hasher.numbers(field.nodes(brick), volume::BrickField<float>::kBrickSize);
+      }
+}
+
+bool isGrey(const Rgb& c) { return c.x == c.y && c.y == c.z; }
+
+}  // namespace
+
+Medium::Placed Medium::place(const volume::BrickField<float>& field, const Mat4d& localFromNode,
+                             double scale, int phaseIndex) {
+  const Mat4d inverse = glm::inverse(localFromNode);
+  return {&field,
+          Vec3f(inverse[0]),
+          Vec3f(inverse[1]),
+          Vec3f(inverse[2]),
+          Vec3f(inverse[3]),
+          static_cast<float>(scale),
+          phaseIndex};
+}
+
+Medium::Medium(std::vector<MediumVolume> volumes) : m_volumes(std::move(volumes)) {
+  std::vector<volume::MajorantSource> sources;
+  double edge = std::numeric_limits<double>::infinity();
+  Hasher hasher;
+  for (const MediumVolume& v : m_volumes) {
+    sources.push_back({&v.density, v.localFromNode, v.densityScale});
+    for (int a = 0; a < 3; ++a) edge = std::min(edge, glm::length(Vec3d(v.localFromNode[a])));
+    int phaseIndex = 0;
+    while (phaseIndex < static_cast<int>(m_phases.size()) &&
+           m_phases[static_cast<std::size_t>(phaseIndex)].g() != v.phase.g())
+      ++phaseIndex;
+    if (phaseIndex == static_cast<int>(m_phases.size())) m_phases.push_back(v.phase);
+    m_placed.push_back(place(v.density, v.localFromNode, v.densityScale, phaseIndex));
+
+    Albedo albedo;
+    albedo.constant = v.albedo;
+    for (const auto& field : v.albedoFields)
+      albedo.fields.push_back(place(field, v.localFromAlbedoNode, 1.0, 0));
+    m_grey = m_grey && (albedo.fields.empty() ? photosphere::transport::isGrey(v.albedo)
+                                              : albedo.fields.size() == 1);
+    m_maximumAlbedo =
+        std::max(m_maximumAlbedo, albedo.fields.empty() ? maxComponent(v.albedo) : 1.0f);
+    m_albedo.push_back(std::move(albedo));
+
+    hasher.number(v.densityScale);
+    hasher.numbers(&v.albedo.x, 3);
+    hasher.number(v.phase.g());
+    hashField(hasher, v.density, v.localFromNode);
+    for (const auto& field : v.albedoFields) hashField(hasher, field, v.localFromAlbedoNode);
+  }
+  if (m_phases.size() > static_cast<std::size_t>(kMaxPhases))
+    throw ConfigError(fmt::format("the volumes mix {} different phase functions; at most {} are served",
+                                  m_phases.size(), kMaxPhases));
+  m_uniformAlbedo = m_volumes.size() == 1 && m_albedo.front().fields.empty();
+  if (m_phases.empty()) m_phases.emplace_back(0.0);
+  if (std::isfinite(edge)) m_voxelEdge = edge;
+  m_majorants = volume::MajorantGrid(sources);
+  m_hash = hasher.hex();
+}
+
+Rgb Medium::Albedo::at(const Vec3f& p) const {
+  if (fields.empty()) return constant;
+  Rgb value(fields[0].field->sample(fields[0].nodeFromLocal(p)));
+  for (std::size_t c = 1; c < fields.size() && c < 3; ++c)
+    value[static_cast<int>(c)] = fields[c].field->sample(fields[c].nodeFromLocal(p));
+  return glm::clamp(value, 0.0f, 1.0f);
+}
+
+void Medium::coefficients(const Vec3f& p, Coefficients& out) const {
+  out.extinction = 0.0f;
+  for (std::size_t i = 0; i < m_phases.size(); ++i) out.scattering[i] = Rgb(0.0f);
+  for (std::size_t i = 0; i < m_placed.size(); ++i) {
+    const Placed& v = m_placed[i];
+    const float sigma = v.scale * v.field->sample(v.nodeFromLocal(p));
+    if (!(sigma > 0.0f)) continue;
+    out.extinction += sigma;
+    out.scattering[static_cast<std::size_t>(v.phaseIndex)] += sigma * m_albedo[i].at(p);
+  }
+}
+
+std::uint64_t Medium::memoryBytes() const {
+  std::uint64_t bytes = m_majorants.memoryBytes();
+  for (const MediumVolume& v : m_volumes) {
+    bytes += v.density.memoryBytes();
+    for (const auto& field : v.albedoFields) bytes += field.memoryBytes();
+  }
+  return bytes;
+}
+
+bool clip(const Box3d& box, const Vec3d& origin, const Vec3d& direction, double& t0, double& t1) {
+  if (box.empty()) return false;
+  for (int a = 0; a < 3; ++a) {
+    if (direction[a] == 0.0) {
+      if (origin[a] < box.min[a] || origin[a] > box.max[a]) return false;
+      continue;
+    }
+    double near = (box.min[a] - origin[a]) / direction[a];
+    double far = (box.max[a] - origin[a]) / direction[a];
+    if (near > far) std::swap(near, far);
+    t0 = std::max(t0, near);
+    t1 = std::min(t1, far);
+  }
+  return t0 < t1;
+}
+
+}  // namespace photosphere::transport
