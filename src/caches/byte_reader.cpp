@@ -49,7 +49,7 @@ void ByteSource::skip(std::uint64_t size, std::string_view what) {
   }
 }
 
-FileReader::FileReader(const fs::path& path) : m_path(path.string()), m_buffer(kBuffer) {
+FileReader::FileReader(const fs::path& path) : m_path(path.string()) {
   std::error_code error;
   const fs::file_status status = fs::status(path, error);
   if (!fs::exists(status)) throw InputMissingError(m_path, "no such file");
@@ -57,6 +57,7 @@ FileReader::FileReader(const fs::path& path) : m_path(path.string()), m_buffer(k
     throw InputMissingError(m_path, "is not a file; name one cache file");
   m_size = fs::file_size(path, error);
   if (error) throw InputMissingError(m_path, error.message());
+  m_buffer.resize(static_cast<std::size_t>(std::min<std::uint64_t>(m_size + 1, kBuffer)));
   m_file.rdbuf()->pubsetbuf(nullptr, 0);  // this class buffers
   m_file.open(path, std::ios::binary);
   if (!m_file) throw InputMissingError(m_path, "cannot be opened; check its permissions");

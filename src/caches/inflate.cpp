@@ -58,6 +58,11 @@ std::size_t Inflate::readSome(void* data, std::size_t size) {
   return wanted - stream.avail_out;
 }
 
+bool Inflate::finish() {
+  char more;
+  return readSome(&more, 1) == 0;
+}
+
 struct Deflate::State {
   z_stream stream{};
   std::array<unsigned char, kChunk> output;

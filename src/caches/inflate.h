@@ -26,6 +26,11 @@ class Inflate final : public ByteSource {
   std::size_t readSome(void* data, std::size_t size) override;
   const std::string& path() const override { return m_source.path(); }
 
+  /// Reads on to the end of the stream, where its checksum stands.
+  /// @return false when there was more data than the caller took (not read, not checked)
+  /// @throws InputError for a wrong checksum or a missing end
+  bool finish();
+
  private:
   struct State;
   ByteSource& m_source;

@@ -170,6 +170,7 @@ UniFile readUni(const std::filesystem::path& path) {
                      "is not a Mantaflow grid or particle file (Blender's config_####.uni "
                      "holds settings only); name density_####.uni or pp_####.uni");
   }
+  if (!source.finish()) damaged(uni.path, "holds more data than its header says");
   return uni;
 }
 

@@ -196,6 +196,8 @@ volume::ParticleSet readParticles(FileReader& file, const Header& header, CacheC
         }
         return bytes / layout.stride;
       });
+  if (!unfinished && !stream.finish())
+    content.notes.push_back("holds more data than the particles that its header counts");
   if (unfinished)
     content.notes.push_back(
         fmt::format("the writer did not finish this file; it holds {} particles", set.size()));
