@@ -27,7 +27,8 @@ const Imath::Box2i kBox({3, -2}, {3 + kWidth - 1, -2 + kHeight - 1});
 
 std::vector<float> ramp() {
   std::vector<float> pixels(kWidth * kHeight);
-  for (std::size_t i = 0; i < pixels.size(); ++i) pixels[i] = static_cast<float>(i) / 7.0f;
+  for (std::size_t i = 0; i < pixels.size(); ++i)
+    pixels[i] = static_cast<float>(i) / 7.0f;
   return pixels;
 }
 
@@ -93,7 +94,8 @@ TEST_P(ForeignCompressions, flatPicturesAreNotTakenForDamage) {
   {
     Imf::Header black(box, box);
     black.compression() = GetParam();
-    for (const char* name : {"R", "G", "B"}) black.channels().insert(name, Imf::Channel(Imf::HALF));
+    for (const char* name : {"R", "G", "B"})
+      black.channels().insert(name, Imf::Channel(Imf::HALF));
     const std::vector<half> zeros(2000 * 1000);
     Imf::FrameBuffer buffer;
     for (const char* name : {"R", "G", "B"})
@@ -119,7 +121,8 @@ TEST(ForeignExr, partsAreCheckedButNotRead) {
     std::vector<Imf::Header> headers{header(), header(Imf::PIZ_COMPRESSION)};
     headers[0].setName("left");
     headers[1].setName("right");
-    for (Imf::Header& one : headers) one.setType(Imf::SCANLINEIMAGE);
+    for (Imf::Header& one : headers)
+      one.setType(Imf::SCANLINEIMAGE);
     Imf::MultiPartOutputFile file((folder / "a.exr").c_str(), headers.data(), 2);
     for (int part = 0; part < 2; ++part) {
       Imf::OutputPart output(file, part);
