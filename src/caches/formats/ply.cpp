@@ -304,7 +304,7 @@ void addChannel(Plan& plan, const std::string& name, int arity, Scalar type, dou
   plan.layout.channels.push_back(std::move(channel));
 }
 
-Plan planOf(const volume::ParticleSet& particles, const std::string& encoding,
+Plan planOf(const WritableParticles& particles, const std::string& encoding,
             const std::string& path, const std::map<std::string, std::string>& metadata) {
   Plan plan;
   plan.layout.order = encoding == "binary_big_endian" ? ByteOrder::big : ByteOrder::little;
@@ -317,9 +317,10 @@ Plan planOf(const volume::ParticleSet& particles, const std::string& encoding,
       plan.header += "comment " + text.substr(begin, end - begin) + "\n";
     }
   }
-  plan.header += fmt::format("element vertex {}\n", particles.size());
-  addChannel(plan, "P", 3, positionType(particles), 1);
-  for (const volume::Attribute& attribute : particles.attributes) {
+  plan.header += fmt::format("element vertex {}\n", particles.set.size());
+  addChannel(plan, "P", 3, positionType(particles.set), 1);
+  for (const volume::Attribute* const column : particles.attributes) {
+    const volume::Attribute& attribute = *column;
     Scalar type = memoryType(attribute);
     double factor = 1;
     if (const auto* wide = std::get_if<std::vector<std::int64_t>>(&attribute.data))
@@ -353,13 +354,13 @@ void appendText(std::string& text, const unsigned char* at, Scalar type) {
 
 void write(const std::filesystem::path& path, const CacheContent& content,
            const ParamValues& options) {
-  const volume::ParticleSet particles = onlyParticles(path, content, "PLY", false);
+  const WritableParticles particles = onlyParticles(path, content, "PLY", false);
   const std::string& encoding = options.text("encoding");
   const Plan plan = planOf(particles, encoding, path.string(), content.metadata);
   ByteWriter file(path);
   file.write(plan.header);
   std::string text;
-  writeRecords(particles, plan.layout, [&](const unsigned char* records, std::size_t count) {
+  writeRecords(particles.set, plan.layout, [&](const unsigned char* records, std::size_t count) {
     if (encoding != "ascii") return file.write(records, count * plan.layout.stride);
     text.clear();
     for (std::size_t i = 0; i < count; ++i, records += plan.layout.stride) {

@@ -308,21 +308,21 @@ void addChannel(const std::string& attribute, int arity, Scalar type, RecordLayo
 }
 
 void write(const std::filesystem::path& path, const CacheContent& content, const ParamValues&) {
-  const volume::ParticleSet particles = onlyParticles(path, content, "PRT", false);
+  const WritableParticles particles = onlyParticles(path, content, "PRT", false);
   RecordLayout layout;
   std::string list;
   std::set<std::string> taken;
-  addChannel("P", 3, positionType(particles), layout, list, taken, path.string());
-  for (const volume::Attribute& attribute : particles.attributes)
-    addChannel(attribute.name, attribute.arity, memoryType(attribute), layout, list, taken,
+  addChannel("P", 3, positionType(particles.set), layout, list, taken, path.string());
+  for (const volume::Attribute* attribute : particles.attributes)
+    addChannel(attribute->name, attribute->arity, memoryType(*attribute), layout, list, taken,
                path.string());
 
-  const std::string chunks = metadataChunks(particles, content);
+  const std::string chunks = metadataChunks(particles.set, content);
   std::string header(kMagic);
   put(header, static_cast<std::int32_t>(kFixedHeader + chunks.size()));
   header.append("Extensible Particle Format").append(6, '\0');
   put(header, std::int32_t(2));
-  put(header, static_cast<std::int64_t>(particles.size()));
+  put(header, static_cast<std::int64_t>(particles.set.size()));
   header += chunks;
   put(header, std::int32_t(4));
   put(header, static_cast<std::int32_t>(layout.channels.size()));
@@ -332,7 +332,7 @@ void write(const std::filesystem::path& path, const CacheContent& content, const
   ByteWriter file(path);
   file.write(header);
   Deflate stream(file);
-  writeRecords(particles, layout, [&](const unsigned char* records, std::size_t count) {
+  writeRecords(particles.set, layout, [&](const unsigned char* records, std::size_t count) {
     stream.write(records, count * layout.stride);
   });
   stream.finish();
