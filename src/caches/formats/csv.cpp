@@ -35,11 +35,15 @@ CacheContent read(const std::filesystem::path& path, const ParamValues& options)
   return content;
 }
 
-/// Whole numbers keep a `.0`, so that a reader sees that the column is real.
+/// Whole numbers keep a `.0`, so that a reader sees that the column is real. Large ones have an
+/// exponent: written out, a float would show more than the nine digits that mark a column as float.
 template <class T>
 void appendReal(std::string& text, T value) {
   const std::size_t begin = text.size();
-  appendNumber(text, value);
+  char buffer[40];
+  const auto result =
+      std::to_chars(buffer, buffer + sizeof buffer, value, std::chars_format::general);
+  text.append(buffer, result.ptr);
   if (text.find_first_not_of("-0123456789", begin) == text.npos) text += ".0";
 }
 
