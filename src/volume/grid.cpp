@@ -5,17 +5,28 @@
 
 namespace photosphere::volume {
 
+namespace {
+
+// A mask grid gives its value type as bool, but is no bool grid.
+bool isMask(const openvdb::GridBase& grid) {
+  return grid.isType<openvdb::MaskGrid>();
+}
+
+}  // namespace
+
 std::string Grid::name() const {
   return m_grid ? m_grid->getName() : std::string();
 }
 
 std::string Grid::valueType() const {
   if (!m_grid) return {};
-  return m_grid->valueType() + (m_grid->saveFloatAsHalf() ? " (half)" : "");
+  std::string type = isMask(*m_grid) ? "mask" : m_grid->valueType();
+  if (m_grid->saveFloatAsHalf()) type.append(" (half)");
+  return type;
 }
 
 GridKind Grid::kind() const {
-  if (!m_grid) return GridKind::other;
+  if (!m_grid || isMask(*m_grid)) return GridKind::other;
   const std::string type = m_grid->valueType();
   if (type == "bool" || type == "float" || type == "double" || type == "int32" || type == "int64")
     return GridKind::scalar;

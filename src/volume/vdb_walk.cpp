@@ -7,7 +7,9 @@
 #include <cerrno>
 #include <cstring>
 #include <fstream>
+#include <string_view>
 #include <system_error>
+#include <utility>
 
 #include "photosphere/core/error.h"
 
@@ -22,6 +24,7 @@ constexpr std::uint32_t kOldest = 213;        // OpenVDB 0.96; older trees have 
 constexpr std::uint32_t kNewest = 224;
 constexpr std::uint32_t kGridInstancing = 216;
 constexpr std::uint32_t kBoostUuid = 218;
+constexpr std::uint32_t kNewTransform = 219;
 constexpr std::uint32_t kSelectiveCompression = 220;
 constexpr std::uint32_t kNodeMaskCompression = 222;
 constexpr std::uint32_t kCompressionFlags = 0x7;  // zip, active mask, blosc
@@ -103,6 +106,10 @@ class Cursor {
   std::uint64_t m_position = 0;
 };
 
+std::string plainName(const VdbDescriptor& grid) {
+  return grid.name.substr(0, grid.name.find('\x1e'));
+}
+
 void walkMetadata(Cursor& in, const char* what) {
   const std::uint64_t at = in.position();
   const auto count = in.value<std::uint32_t>(what);
@@ -140,6 +147,53 @@ void walkHeader(Cursor& in, VdbContents& contents) {
   in.skip(contents.fileVersion >= kBoostUuid ? 36 : 16, "the file's UUID");
 }
 
+// Bytes that a transform takes after its type name, or 0 where that varies (frustum).
+// Source: openvdb/math/Maps.h, the maps' write().
+std::uint64_t transformBytes(Cursor& in) {
+  static constexpr std::pair<std::string_view, std::uint64_t> maps[] = {
+      {"AffineMap", 128},
+      {"UnitaryMap", 128},
+      {"ScaleMap", 120},
+      {"UniformScaleMap", 120},
+      {"TranslationMap", 24},
+      {"ScaleTranslateMap", 144},
+      {"UniformScaleTranslateMap", 144},
+      {"NonlinearFrustumMap", 0},
+  };
+  const std::uint64_t at = in.position();
+  const std::string type = in.text("a grid's transform type");
+  for (const auto& [name, bytes] : maps)
+    if (type == name) return bytes;
+  in.fail(at, fmt::format("unknown transform type \"{}\"", type));
+}
+
+// Bytes of a tree's value type, or 0 when it is not one of OpenVDB's own.
+std::uint64_t valueBytes(std::string_view gridType) {
+  static constexpr std::pair<std::string_view, std::uint64_t> types[] = {
+      {"float", 4},  {"double", 8}, {"bool", 1},   {"mask", 1},        {"int32", 4},   {"int64", 8},
+      {"vec3s", 12}, {"vec3d", 24}, {"vec3i", 12}, {"ptdataidx32", 4}, {"ptidx32", 4},
+  };
+  for (const auto& [name, bytes] : types)
+    if (gridType.starts_with(fmt::format("Tree_{}_5_4_3", name))) return bytes;
+  return 0;
+}
+
+// The root's counts of tiles and children, which OpenVDB loops over even past the end of the file.
+void walkRoot(Cursor& in, const VdbDescriptor& grid) {
+  const std::uint64_t value = valueBytes(grid.type);
+  if (value == 0) return;
+  in.skip(4 + value, "a tree's background");
+  const std::uint64_t at = in.position();
+  const auto tiles = in.value<std::uint32_t>("a tree's size");
+  const auto children = in.value<std::uint32_t>("a tree's size");
+  const std::uint64_t tile = 12 + value + 1, child = 12 + 2 * 32768 / 8;  // two masks of 32^3 bits
+  const std::uint64_t end = static_cast<std::uint64_t>(grid.blockPos);
+  const std::uint64_t room = end > in.position() ? end - in.position() : 0;
+  if (tiles * tile > room || children * child > room - tiles * tile)
+    in.fail(at, fmt::format("grid \"{}\" claims {} tiles and {} nodes in {} bytes", plainName(grid),
+                            tiles, children, room));
+}
+
 void walkGrid(Cursor& in, const VdbContents& contents, const VdbDescriptor& grid,
               std::uint64_t positionsAt) {
   const auto size = static_cast<std::int64_t>(in.size());
@@ -152,8 +206,7 @@ void walkGrid(Cursor& in, const VdbContents& contents, const VdbDescriptor& grid
     in.fail(positionsAt,
             fmt::format("grid \"{}\" claims bytes {} to {} (voxels from {}) of a file of {} bytes: "
                         "the file was not written to its end or not copied whole",
-                        grid.name.substr(0, grid.name.find('\x1e')), grid.gridPos, grid.endPos,
-                        grid.blockPos, size));
+                        plainName(grid), grid.gridPos, grid.endPos, grid.blockPos, size));
   in.seek(static_cast<std::uint64_t>(grid.gridPos));
   if (contents.fileVersion >= kNodeMaskCompression) {
     const std::uint64_t at = in.position();
@@ -161,7 +214,13 @@ void walkGrid(Cursor& in, const VdbContents& contents, const VdbDescriptor& grid
     if (flags & ~kCompressionFlags) in.fail(at, fmt::format("unknown compression {:#x}", flags));
   }
   walkMetadata(in, "a grid's metadata");
-  in.text("a grid's transform");
+  if (contents.fileVersion >= kNewTransform) {
+    const std::uint64_t bytes = transformBytes(in);
+    if (bytes > 0) {
+      in.skip(bytes, "a grid's transform");
+      if (!instance) walkRoot(in, grid);
+    }
+  }
   in.seek(static_cast<std::uint64_t>(grid.endPos));
 }
 

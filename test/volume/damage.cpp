@@ -40,7 +40,7 @@ void readDamaged(const fs::path& path, const std::string& what, Outcome& outcome
   const pid_t child = fork();
   ASSERT_GE(child, 0);
   if (child == 0) {
-    const struct rlimit memory { rlim_t(4) << 30, rlim_t(4) << 30 }, cpu{10, 10}, core{0, 0};
+    const struct rlimit memory { rlim_t(4) << 30, rlim_t(4) << 30 }, cpu{10, 12}, core{0, 0};
     setrlimit(RLIMIT_AS, &memory);
     setrlimit(RLIMIT_CPU, &cpu);
     setrlimit(RLIMIT_CORE, &core);

@@ -9,8 +9,13 @@
 namespace photosphere::volume {
 
 struct RasterizeOptions {
-  double voxelSize = 0;  ///< edge [scene units]; 0 = half the median particle radius
-  double radius = 0;     ///< one radius for all [scene units]; 0 = `pscale`, else from spacing
+  /// Edge of a voxel [scene units]; 0 = half the median particle radius, but not so small that the
+  /// kernels could touch more than 2^28 voxels (1 GiB; counted as the smaller of the kernels'
+  /// summed volume and the volume of their bounding box) or that indices would leave 30 bits.
+  double voxelSize = 0;
+  /// One radius for all [scene units]; 0 = `pscale` when some particle has one above 0, else twice
+  /// the median spacing.
+  double radius = 0;
 };
 
 struct RasterizeResult {
@@ -18,18 +23,21 @@ struct RasterizeResult {
   double voxelSize = 0;  ///< as chosen [scene units]
   double radiusMin = 0, radiusMedian = 0, radiusMax = 0;
   bool radiusFromSpacing = false;
-  double spacing = 0;        ///< median distance to the nearest neighbour (0 when radius was given)
+  double spacing = 0;        ///< medianSpacing() where the radius came from it, else 0
   double massParticles = 0;  ///< sum over the particles
   double massGrid = 0;       ///< sum of density times voxel volume
   std::uint64_t skipped =
       0;  ///< particles with a position, radius or mass that is not finite or < 0
 };
 
-/// Mass of a particle: `mass`, else density * 4/3 pi pscale^3, else 1 (SCENE.md, volume.file).
-/// Spreads it over the voxel centres within `radius` by an Epanechnikov kernel that is normalised
-/// over those voxels (sum of weights 1), the nearest voxel taking all when none lies inside. The
-/// result does not depend on the number of threads.
-/// @throws ConfigError for a negative option; MemoryError when the voxels would exceed the budget
+/// Mass of a particle: `mass`, else density * 4/3 pi r^3 with r its `pscale`, or the radius where
+/// the set has none, else 1. Spreads it over the voxel centres within `radius` by an Epanechnikov
+/// kernel that is normalised over those voxels (sum of weights 1), the nearest voxel taking all
+/// when none lies inside. The result does not depend on the number of threads. Memory besides the
+/// set and the grid: about 56 bytes a particle and 16 a (particle, tile) pair, two pairs a particle
+/// where the voxel size is the default.
+/// @throws ConfigError for a negative option, or a voxel size so small that indices leave 30 bits;
+///   MemoryError when pairs and voxels would not fit 80 % of the memory that is free
 RasterizeResult rasterize(const ParticleSet& particles, const RasterizeOptions& options);
 
 /// Median distance from a particle to its nearest other, over at most 20,000 particles spread
