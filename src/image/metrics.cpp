@@ -17,6 +17,13 @@ bool allFinite(const Planes& planes, std::size_t pixel) {
   return true;
 }
 
+/// Such as an infinite depth where both see nothing. NaN equals nothing.
+bool identical(const Planes& a, const Planes& b, std::size_t pixel) {
+  for (std::size_t c = 0; c < a.size(); ++c)
+    if (!(a[c][pixel] == b[c][pixel])) return false;
+  return true;
+}
+
 void checkSizes(const Planes& image, const Planes& reference, const MeasureOptions& options) {
   bool same = !reference.empty() && image.size() == reference.size();
   const std::size_t count = reference.empty() ? 0 : reference[0].size();
@@ -38,6 +45,7 @@ std::vector<std::size_t> selectPixels(const Planes& image, const Planes& referen
     if (!options.mask.empty() && !options.mask[i]) continue;
     const bool imageFinite = allFinite(image, i);
     const bool referenceFinite = allFinite(reference, i);
+    if (!(imageFinite && referenceFinite) && identical(image, reference, i)) continue;
     metrics.nonFiniteImage += imageFinite ? 0 : 1;
     metrics.nonFiniteReference += referenceFinite ? 0 : 1;
     if (imageFinite && referenceFinite) selected.push_back(i);
