@@ -1,0 +1,44 @@
+#pragma once
+// Phase functions averaged over the cells of a partition: what turns a direction histogram into
+// in-scattered light (METHOD.md section 5.1).
+
+#include <functional>
+#include <vector>
+
+#include "photosphere/core/types.h"
+#include "photosphere/sphere/partition.h"
+
+namespace photosphere::sphere {
+
+/// Table of W_j(wo) = (1/A) * integral over cell j of f(w, wo) dw [1/sr], the phase function
+/// averaged over bin j, for every outgoing direction wo. The partition looks the same from every
+/// octant, so only first-octant wo are tabulated, on a triangular lattice whose spacing follows the
+/// width of the lobe; between its nodes W_j is linear. Every node is scaled to sum_j A W_j = 1
+/// (quadrature leaves below 1e-4), which linear interpolation keeps. Immutable; thread-safe.
+class BinWeights {
+ public:
+  /// Phase function [1/sr] of unit propagation directions. It must depend on the angle between them
+  /// alone and be safe to call from several threads.
+  using Phase = std::function<double(const Vec3f& w, const Vec3f& wo)>;
+
+  /// @param meanCosine  g of the lobe: 1 - |g| sets the resolution of the quadrature and lattice,
+  /// its
+  ///                    sign the side of the peak. Finer than |g| = 0.995 is treated as that.
+  BinWeights(const Partition& partition, const Phase& phase, double meanCosine);
+
+  int size() const { return m_partition.size(); }
+  /// Writes size() weights [1/sr] for a unit propagation direction toward the eye. The zero vector
+  /// counts as +z.
+  void weights(const Vec3f& wo, float* out) const;
+  /// Edges of the lattice along one side of the octant.
+  int latticeSize() const { return m_lattice; }
+
+ private:
+  const float* node(int i, int j) const;
+
+  Partition m_partition;
+  int m_lattice = 1;
+  std::vector<float> m_table;  // node after node, size() weights each
+};
+
+}  // namespace photosphere::sphere

@@ -1,0 +1,43 @@
+#pragma once
+// Directions of the first octant from (s, azimuth), s = sqrt(1 - z). With only +, -, *, / and sqrt,
+// so that deposits which depend on them have the same bits on every CPU.
+
+#include <cmath>
+
+#include "photosphere/core/types.h"
+
+namespace photosphere::sphere {
+
+/// sin(x) for x in [0, pi / 2], by its Taylor series (the 12th term is below 1e-18).
+inline double octantSin(double x) {
+  double sum = 0;
+  for (int n = 23; n > 1; n -= 2)
+    sum = (1 + sum) * (-x * x / (n * (n - 1)));
+  return x * (1 + sum);
+}
+
+/// @param s        sqrt(1 - z) in [0, 1]; rows of the partition are even in it
+/// @param azimuth  part of the octant's quarter turn, in [0, 1]
+inline Vec3d octantDirection(double s, double azimuth) {
+  const double sine = s * std::sqrt(2 - s * s);
+  return {sine * octantSin((1 - azimuth) * kPi / 2), sine * octantSin(azimuth * kPi / 2),
+          1 - s * s};
+}
+
+/// A vector with the signs of an octant.
+template <class V>
+V mirroredInto(int octant, const V& w) {
+  return {octant & 1 ? -w.x : w.x, octant & 2 ? -w.y : w.y, octant & 4 ? -w.z : w.z};
+}
+
+/// Row of a cell of octant 0: the rows before row i hold i^2 cells.
+inline int rowOf(int cellInOctant) {
+  int row = static_cast<int>(std::sqrt(static_cast<double>(cellInOctant)));
+  while (row * row > cellInOctant)
+    --row;
+  while ((row + 1) * (row + 1) <= cellInOctant)
+    ++row;
+  return row;
+}
+
+}  // namespace photosphere::sphere
