@@ -46,10 +46,20 @@ struct CameraPlugin {
                                     const Vec2i& resolution);
 };
 
+/// Options common to all cameras: place, resolution, shutter and lens. Whoever builds a camera
+/// turns them into the matrix and resolution that `create` takes.
+std::span<const Param> cameraParams();
+
+/// World from camera as the options common to all cameras say: `matrix` where given, else `lookAt`
+/// of `position`, `look_at` and `up`.
+/// @throws ConfigError for a matrix that is not a rigid motion times a positive scale; the scale is
+///         removed
+Mat4d worldFromCameraValues(const ParamValues& common);
+
 /// Every camera (generated).
 std::span<const CameraPlugin* const> cameraModels();
 
-/// World from camera for an eye that looks at a point. A view along `up` takes another up.
+/// World from camera for an eye that looks at a point. A view along `up` takes another up. Rigid.
 /// @throws ConfigError when eye and target coincide
 Mat4d lookAt(const Vec3d& eye, const Vec3d& target, const Vec3d& up);
 

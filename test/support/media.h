@@ -1,0 +1,35 @@
+#pragma once
+// Media with known answers, built straight from bricks.
+
+#include <functional>
+
+#include "photosphere/transport/medium.h"
+#include "photosphere/transport/photon_tracer.h"
+
+namespace photosphere::test {
+
+struct MediumOptions {
+  double albedo = 0.9;
+  double g = 0.0;
+  double extinction = 1.0;  ///< [1/m] per unit of density
+};
+
+/// A box of constant density 1 with sharp faces: `cells` multiples of 8, centred on the origin.
+transport::MediumVolume boxVolume(const Vec3d& size, const Vec3i& cells, const MediumOptions& options);
+
+/// A density sampled at the nodes of a lattice of `cells` (a multiple of 8 a side) over a cube of the
+/// given edge, centred on the origin.
+transport::MediumVolume sampledVolume(double edge, int cells, const MediumOptions& options,
+                                      const std::function<double(const Vec3d&)>& density);
+
+/// Density of a fractal plume in a unit cube about the origin: a rising, widening column eaten away by
+/// value noise. Largest value about 1.
+double plumeDensity(const Vec3d& p);
+
+transport::Medium makeMedium(transport::MediumVolume volume);
+
+/// A lamp by plug-in name with options as text, at metres per unit 1 and centre 0.
+std::unique_ptr<lights::Light> makeLight(
+    const std::string& type, const std::vector<std::pair<std::string, std::string>>& options);
+
+}  // namespace photosphere::test
