@@ -1,3 +1,4 @@
+cmake_minimum_required(VERSION 3.25)
 # Fails when a file of module M includes a header of a module that M's row does not name, or when a
 # third-party library leaves its room (ARCHITECTURE.md). Variables: ROOT, TABLE.
 file(STRINGS "${TABLE}" rows)

@@ -97,9 +97,9 @@ std::vector<SlabCase> cases() {
   return all;
 }
 
-INSTANTIATE_TEST_SUITE_P(Reference, Slab, testing::ValuesIn(cases()), [](const auto& info) {
-  std::string name = info.param.illumination + "_tau" + std::to_string(info.param.tau) + "_albedo" +
-                     std::to_string(info.param.albedo) + "_g" + std::to_string(info.param.g);
+INSTANTIATE_TEST_SUITE_P(Reference, Slab, testing::ValuesIn(cases()), [](const auto& slab) {
+  std::string name = slab.param.illumination + "_tau" + std::to_string(slab.param.tau) + "_albedo" +
+                     std::to_string(slab.param.albedo) + "_g" + std::to_string(slab.param.g);
   for (char& ch : name)
     if (!std::isalnum(static_cast<unsigned char>(ch))) ch = '_';
   return name;
