@@ -1,0 +1,81 @@
+#pragma once
+// One frame made ready: medium, lights, camera and carriers in local space, and the effects that
+// the frame simulates.
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "photosphere/cameras/camera.h"
+#include "photosphere/core/effects.h"
+#include "photosphere/core/rng.h"
+#include "photosphere/estimators/light_field.h"
+#include "photosphere/lights/light.h"
+#include "photosphere/scene/scene_file.h"
+#include "photosphere/transport/medium.h"
+#include "photosphere/transport/photon_tracer.h"
+
+namespace photosphere::scene {
+
+/// What overrides the scene file for one run.
+struct SetupOptions {
+  std::optional<Vec2i> resolution;  ///< [pixels]
+  std::optional<std::int64_t> seed;
+  std::optional<std::int64_t>
+      cacheFrame;              ///< frame of the caches, where it is not that of the picture
+  bool forLightCache = false;  ///< basis auto = histogram
+};
+
+/// Whether one effect is simulated, and why.
+struct EffectState {
+  std::string name;  ///< as in [effects]
+  bool on = false;
+  std::string why;
+};
+
+struct FrameSetup {
+  std::int64_t frame = 0;
+  lights::LocalSpace space;
+  Box3d worldBounds;  ///< of everything that can scatter [scene units]; empty without smoke
+  std::unique_ptr<transport::Medium> medium;  ///< never null; may be empty
+  transport::LightList lights;
+  std::unique_ptr<cameras::Camera> camera;
+  estimators::View view;
+  /// Local space [m], in the order in which a point grid gives them back; carrier = "particles"
+  /// alone.
+  std::vector<Vec3f> particles;
+  Effects effects;
+  std::vector<EffectState> effectStates;
+  RandomKey key;
+  estimators::LightFieldLayout layout;  ///< of type `photosphere`; radius chosen where it was 0
+  std::uint64_t memoryBudget = 0;       ///< bytes that this frame may use; 0 = no limit
+  double readSeconds = 0, rasterizeSeconds = 0;
+  std::vector<std::string> notes;  ///< what the user should know
+};
+
+/// Reads the caches of a frame and builds everything.
+/// @throws ConfigError for combinations that METHOD.md does not allow; InputMissingError,
+/// InputError
+///         for caches (a missing grid lists the grids that are there); MemoryError (exit 5) when
+///         the smoke alone passes the budget
+FrameSetup setUpFrame(const SceneFile& scene, std::int64_t frame, const SetupOptions& options = {});
+
+/// Predicted bytes of the light field that `setup.layout` asks for: carriers times values times 12
+/// (a 64-bit sum and its float).
+std::uint64_t predictedLightFieldBytes(const FrameSetup& setup);
+
+/// @throws MemoryError (exit 5) naming numbers and remedies when smoke, light field and frame would
+/// pass
+///         the budget
+void checkMemory(const FrameSetup& setup, bool lightField);
+
+/// World from camera that looks at a box from the front three-quarter so that its bounding sphere
+/// fits the frame.
+/// @param up          unit, world space
+/// @param fovDegrees  horizontal
+Mat4d frameBox(const Box3d& box, const Vec3d& target, const Vec3d& up, double fovDegrees,
+               const Vec2i& resolution);
+
+}  // namespace photosphere::scene

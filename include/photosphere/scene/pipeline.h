@@ -1,0 +1,101 @@
+#pragma once
+// From a scene to a frame: set-up, light field, resolve, shadows, march, file.
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "photosphere/image/exr.h"
+#include "photosphere/image/image.h"
+#include "photosphere/render/frame.h"
+#include "photosphere/scene/frame_setup.h"
+#include "photosphere/scene/scene_file.h"
+
+namespace photosphere::scene {
+
+/// What a command line asks for beside the scene. The number of threads is core's ThreadLimit.
+struct RenderRequest {
+  std::optional<Vec2i> resolution;   ///< [pixels]; replaces camera.resolution
+  std::optional<render::Crop> crop;  ///< [pixels], clipped to the frame
+  std::optional<std::int64_t> seed;
+  std::optional<std::int64_t> cacheFrame;  ///< frame of the caches, where it differs
+  bool allowStale = false;                 ///< use a light cache made for another medium or lights
+};
+
+/// Wall-clock seconds of each stage.
+struct StageSeconds {
+  double read = 0, rasterize = 0, trace = 0, resolve = 0, march = 0, write = 0, total = 0;
+};
+
+/// What --stats and the EXR header report.
+struct FrameStatistics {
+  StageSeconds seconds;
+  double cpuSeconds = 0;
+  std::uint64_t peakMemoryBytes = 0;
+  std::uint64_t photonsEmitted = 0, photonsScattered = 0, photonsStored = 0, photonsCapped = 0;
+  /// Per channel [W].
+  Vec3d energyEmitted{0.0}, energyMissed{0.0}, energyAbsorbed{0.0}, energyEscaped{0.0},
+      energyCapped{0.0}, energyError{0.0};
+  std::uint64_t nanSamples = 0, negativeSamples = 0, majorantViolations = 0;
+  std::uint64_t pathsCapped = 0;   ///< path_traced: ended by max_scatter
+  double pathsCappedRadiance = 0;  ///< throughput they still carried, summed
+  std::vector<EffectState> effects;
+  double imageMean = 0, imageMax = 0;  ///< of R, G, B [W m^-2 sr^-1]
+  std::string sceneHash, mediumHash;
+};
+
+/// One rendered frame and all that its file says about it.
+struct FrameResult {
+  std::int64_t frame = 0;
+  render::FrameLayers layers;
+  FrameStatistics statistics;
+  std::vector<std::string> layerNames;  ///< layers this frame has, by their names in output.aovs
+  Mat4d cameraFromWorld{1.0}, ndcFromWorld{1.0};
+  double framesPerSecond = 24;
+  std::string estimator;  ///< estimator.type
+  std::string
+      layout;  ///< one line: carrier, basis, bins, deposit, kernel; empty without light field
+  double radius = 0;  ///< of the spatial kernel [scene units]; 0 without light field
+  std::int64_t seed = 0;
+  std::vector<std::string> notes;
+};
+
+/// Renders one frame.
+/// @throws what setUpFrame throws; MemoryError before tracing; Error naming the first pixel when a
+///         sample is NaN or negative; InterruptedError
+FrameResult renderScene(const SceneFile& scene, std::int64_t frame,
+                        const RenderRequest& request = {});
+
+/// Where and how a frame is written.
+struct WriteRequest {
+  std::string path;     ///< EXR; frame tokens are replaced
+  std::string preview;  ///< PNG or JPEG; empty = none; frame tokens are replaced
+  bool floatColor = false;
+  image::ExrCompression compression = image::ExrCompression::zip;
+  std::string ocioConfig, ocioDisplay, ocioView;  ///< empty = defaults (image/color.h)
+  float exposure = 0;                             ///< of the preview [stops]
+};
+
+/// Layers as image channels: R, G, B, A for `beauty`, `single.R`..., `Z` for `depth`.
+/// @param aovs  names from `layerNames`; empty = all. @throws ConfigError for others
+image::Image frameImage(const FrameResult& result, const std::vector<std::string>& aovs);
+
+/// Writes EXR and preview; sets statistics.seconds.write and adds it to the total.
+/// @throws ConfigError for unknown layers or colour spaces; OutputError
+void writeFrame(FrameResult& result, const SceneFile& scene, const WriteRequest& request);
+
+/// The object of `--stats` as JSON text with a final newline. Always valid JSON: what is not finite
+/// is null.
+std::string statsJson(const FrameStatistics& statistics);
+
+/// Traces the light of a frame into a light cache (`photosphere trace`).
+/// @param output  .vdb; frame tokens are replaced
+/// @return statistics of that frame
+FrameStatistics traceScene(const SceneFile& scene, std::int64_t frame, const std::string& output,
+                           const RenderRequest& request = {});
+
+/// The frames that a scene asks for: scene.frames, else {1}.
+std::vector<std::int64_t> sceneFrames(const SceneFile& scene);
+
+}  // namespace photosphere::scene

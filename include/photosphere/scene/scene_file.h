@@ -1,0 +1,87 @@
+#pragma once
+// The scene file (TOML): what a user writes, parsed and checked against option rows. The contract
+// is the options' own rows; every key has one.
+
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "photosphere/core/param.h"
+
+namespace photosphere::scene {
+
+/// One `[[volume]]`.
+struct VolumeEntry {
+  ParamValues values;  ///< volumeParams()
+  std::string
+      albedoGrid;  ///< where `albedo` names a grid; else empty and `values` holds the number
+  std::string phase = "henyey_greenstein";  ///< phase plug-in
+  ParamValues phaseValues;                  ///< that plug-in's rows
+  std::string where;  ///< "scene.toml:12: [[volume]] 0", begins messages about it
+};
+
+/// One `[[light]]`.
+struct LightEntry {
+  std::string type;    ///< light plug-in
+  ParamValues values;  ///< lights::lightParams() and the plug-in's rows
+  std::string where;
+};
+
+/// A scene as written, with every default filled in. Paths are as written; see `resolvePath`.
+struct SceneFile {
+  std::string path;              ///< of the file; empty for a scene made by sceneForVolume
+  std::filesystem::path folder;  ///< what relative paths are relative to
+  ParamValues scene;
+  std::string cameraType = "perspective";
+  ParamValues camera;  ///< cameras::cameraParams() and the plug-in's rows
+  std::string cameraWhere;
+  std::vector<VolumeEntry> volumes;
+  std::vector<LightEntry> lights;
+  ParamValues estimator, effects, render, output;
+  /// What sceneForVolume chose, one sentence each; empty for a scene that was read.
+  std::vector<std::string> choices;
+
+  /// An absolute path as it is, a relative one below `folder`; an empty one stays empty.
+  std::string resolvePath(const std::string& written) const;
+  /// True when neither `position` nor `matrix` places the camera: it then frames the smoke.
+  bool framesSmoke() const;
+  /// Hash of all that pixels depend on, but not of the caches' content, as 16 hex digits.
+  std::string hash() const;
+};
+
+/// Rows of the tables that belong to no plug-in: for --help and `photosphere list`.
+std::span<const Param> sceneParams();
+std::span<const Param> volumeParams();
+std::span<const Param> estimatorParams();
+std::span<const Param> effectsParams();
+std::span<const Param> renderParams();
+std::span<const Param> outputParams();
+
+/// Reads and checks a scene file.
+/// @param sets  `dotted.path=value` with the value as TOML, else as a string:
+///              `volume.0.density_scale=4`, `light.0.intensity=2`; missing tables are created
+/// @throws InputMissingError when the file cannot be opened; ConfigError (`file:line: [table]:
+/// ...`)
+///         for text that is not TOML, for an unknown table, key or value (listing the known ones),
+///         for values out of range, and for what the contract knows but this version does not serve
+SceneFile loadScene(const std::filesystem::path& path, const std::vector<std::string>& sets = {});
+
+/// The same from text. @param name  stands for the file in messages
+SceneFile parseScene(const std::string& text, const std::string& name,
+                     const std::filesystem::path& folder,
+                     const std::vector<std::string>& sets = {});
+
+/// TOML that loadScene reads back to the same scene, from any folder: paths become absolute.
+std::string dumpScene(const SceneFile& scene);
+
+/// The scene of `photosphere render FILE.vdb`: the named or only fog grid (or the points),
+/// extinction scaled to a useful optical depth, a camera that frames the smoke and one key light.
+/// `choices` says what was chosen and why.
+/// @param path  any cache that module `caches` reads; a path with `####` uses the first frame found
+/// @param sets  applied over what was chosen
+/// @throws InputMissingError, InputError, ConfigError
+SceneFile sceneForVolume(const std::filesystem::path& path,
+                         const std::vector<std::string>& sets = {});
+
+}  // namespace photosphere::scene
