@@ -8,6 +8,7 @@ find_package(fmt REQUIRED)
 find_package(spdlog REQUIRED)
 find_package(glm REQUIRED)
 find_package(nlohmann_json REQUIRED)
+find_package(CLI11 REQUIRED)
 
 # Debian keeps FindOpenVDB.cmake off the search path. It calls find_package(Boost) for iostreams.
 find_path(PHOTOSPHERE_FIND_OPENVDB_DIR FindOpenVDB.cmake

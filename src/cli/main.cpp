@@ -1,14 +1,86 @@
 #include "photosphere/cli/main.h"
 
-#include <cstdio>
+#include <fmt/format.h>
 
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <new>
+
+#include "command.h"
+#include "options.h"
+#include "photosphere/core/error.h"
+#include "photosphere/core/interrupt.h"
+#include "photosphere/core/log.h"
+#include "photosphere/core/output_file.h"
 #include "photosphere/core/version.h"
 
 namespace photosphere::cli {
 
-int run(int, char**) {
-  std::puts(versionText().c_str());
-  return 0;
+namespace {
+
+constexpr const char* kExitCodes =
+    "Exit codes: 0 ok; 1 unspecified; 2 usage or scene error; 3 input missing; 4 input invalid;\n"
+    "5 over the memory budget; 6 output error; 7 comparison target missed; 8 some frames failed;\n"
+    "75 interrupted after a checkpoint, run again; 130, 143 ended by a signal.";
+
+int parseAndRun(int argc, char** argv) {
+  CLI::App app("Renders light that is scattered many times in smoke.", "photosphere");
+  app.set_version_flag("--version", versionText());
+  app.require_subcommand(1);
+  app.footer(kExitCodes);
+  GeneralOptions general;
+  std::function<int()> chosen;
+  for (const Command* command : commands()) {
+    CLI::App* sub = app.add_subcommand(std::string(command->name), std::string(command->help));
+    auto body = command->declare(*sub);
+    addGeneralOptions(*sub, general);
+    sub->callback([&chosen, body = std::move(body)] { chosen = body; });
+  }
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& wanted) {
+    return app.exit(wanted);  // help or version
+  } catch (const CLI::ParseError& error) {
+    throw ConfigError(fmt::format("{} (see photosphere {}--help)", error.what(),
+                                  app.get_subcommands().empty()
+                                      ? std::string()
+                                      : app.get_subcommands().front()->get_name() + " "));
+  }
+  const auto threads = apply(general);
+  return chosen();
+}
+
+int report(ExitCode code, const char* why) {
+  log::error("{}", why);
+  return static_cast<int>(code);
+}
+
+// Every exception of a command ends here and becomes its exit code.
+int guarded(int argc, char** argv) {
+  try {
+    return parseAndRun(argc, argv);
+  } catch (const InterruptedError& error) {
+    removeTemporaries();
+    log::error("{}", error.what());
+    return 128 + error.signal();
+  } catch (const Error& error) {
+    return report(error.code(), error.what());
+  } catch (const std::bad_alloc&) {
+    return report(ExitCode::memory, "out of memory; use fewer photons, particles or voxels");
+  } catch (const std::exception& error) {
+    return report(ExitCode::unspecified, error.what());
+  }
+}
+
+}  // namespace
+
+int run(int argc, char** argv) {
+  installSignalHandlers();
+  const int code = guarded(argc, argv);
+  // A result that nobody received is no result.
+  if ((std::fflush(stdout) != 0 || std::ferror(stdout)) && code == 0)
+    return report(ExitCode::output, "standard output: cannot write (disk full, or reader gone?)");
+  return code;
 }
 
 }  // namespace photosphere::cli

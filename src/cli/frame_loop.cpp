@@ -1,0 +1,54 @@
+#include "frame_loop.h"
+
+#include <fmt/format.h>
+
+#include <new>
+
+#include "photosphere/core/error.h"
+#include "photosphere/core/frames.h"
+#include "photosphere/core/interrupt.h"
+#include "photosphere/core/log.h"
+
+namespace photosphere::cli {
+
+void checkOutputPattern(const std::string& output, std::size_t frames) {
+  if (frames < 2 || hasFrameToken(output)) return;
+  const std::size_t dot = output.find_last_of("./");
+  const std::string example = dot == std::string::npos || output[dot] == '/'
+                                  ? output + ".####"
+                                  : output.substr(0, dot) + ".####" + output.substr(dot);
+  throw ConfigError(
+      fmt::format("{}: {} frames would overwrite one another; add #### where the frame number "
+                  "belongs (such as {})",
+                  output, frames, example));
+}
+
+int runFrames(const std::vector<std::int64_t>& frames, bool keepGoing,
+              const std::function<void(std::int64_t)>& body) {
+  std::vector<std::int64_t> failed;
+  auto report = [&](std::int64_t frame, const char* why) {
+    log::error("frame {}: {}", frame, why);
+    failed.push_back(frame);
+  };
+  for (const std::int64_t frame : frames) {
+    throwIfInterrupted();
+    if (!keepGoing) {
+      body(frame);
+      continue;
+    }
+    try {
+      body(frame);
+    } catch (const InterruptedError&) {
+      throw;
+    } catch (const std::bad_alloc&) {
+      report(frame, "out of memory");
+    } catch (const std::exception& error) {
+      report(frame, error.what());
+    }
+  }
+  if (failed.empty()) return static_cast<int>(ExitCode::ok);
+  log::error("{} of {} frames failed: {}", failed.size(), frames.size(), formatFrames(failed));
+  return static_cast<int>(ExitCode::someFramesFailed);
+}
+
+}  // namespace photosphere::cli

@@ -1,0 +1,21 @@
+#pragma once
+// The loop over frames that convert, trace and render share.
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace photosphere::cli {
+
+/// Refuses an output path that would give every frame the same name.
+/// @throws ConfigError that says to add ####
+void checkOutputPattern(const std::string& output, std::size_t frames);
+
+/// Calls `body` frame by frame. With `keepGoing` a frame that fails is reported and the others
+/// follow; an interrupt always ends the loop.
+/// @return exit code: ok, or someFramesFailed
+int runFrames(const std::vector<std::int64_t>& frames, bool keepGoing,
+              const std::function<void(std::int64_t)>& body);
+
+}  // namespace photosphere::cli

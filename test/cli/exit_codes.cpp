@@ -1,0 +1,167 @@
+// Every way to go wrong has its exit code, says what and where, and leaves nothing behind.
+
+#include <unistd.h>
+
+#include "fixture.h"
+
+namespace photosphere::test {
+namespace {
+
+struct Case {
+  const char* name;
+  std::vector<std::string> arguments;  ///< relative to the folder of files
+  int exitCode;
+  const char* message;  ///< part of what standard error must say
+};
+
+void PrintTo(const Case& c, std::ostream* out) {
+  *out << c.name;
+}
+
+class ExitCodes : public ::testing::TestWithParam<Case> {
+ protected:
+  static void SetUpTestSuite() {
+    s_folder = std::make_unique<TemporaryFolder>();
+    const TemporaryFolder& f = *s_folder;
+    volume::writeVdb(f / "smoke.vdb", {ballOfSmoke(0.1)});
+    volume::writeVdb(f / "cut.vdb", {ballOfSmoke(0.1)});
+    truncate(f / "cut.vdb");
+    writePly(f / "points.ply", ribbon(50, true));
+    writeText(f / "empty.ply", "");
+    writeText(f / "scene.abc", "Ogawa and so on");
+    for (int i = 1; i <= 2; ++i)
+      volume::writeVdb(f / ("seq.000" + std::to_string(i) + ".vdb"), {ballOfSmoke(0.1 * i)});
+    image::Image grey(4, 4);
+    grey.addLayer("", image::ChannelKind::color);
+    for (int i = 0; i < 16; ++i)
+      grey.setRgb("", i % 4, i / 4, Rgb(1.0f));
+    image::writeExr(f / "a.exr", grey);
+    grey.setRgb("", 2, 1, Rgb(1.5f));
+    image::writeExr(f / "b.exr", grey);
+    image::writeExr(f / "cut.exr", grey);
+    truncate(f / "cut.exr");
+    image::Image small(2, 2);
+    small.addLayer("", image::ChannelKind::color);
+    image::writeExr(f / "small.exr", small);
+    fs::create_directory(f / "folder.vdb");
+    fs::create_symlink("/dev/full", f / "full.vdb");
+    fs::create_symlink("/dev/full", f / "full.ply");
+  }
+  static void TearDownTestSuite() { s_folder.reset(); }
+
+  static std::unique_ptr<TemporaryFolder> s_folder;
+};
+
+std::unique_ptr<TemporaryFolder> ExitCodes::s_folder;
+
+TEST_P(ExitCodes, AreAsPromised) {
+  const Case& c = GetParam();
+  const auto before = namesIn(s_folder->path());
+  const RunResult result = runTool(c.arguments, s_folder->path());
+  EXPECT_EQ(result.exitCode, c.exitCode) << result.out << result.err;
+  EXPECT_NE(result.err.find(c.message), std::string::npos)
+      << "wanted: " << c.message << "\ngot: " << result.err;
+  if (c.exitCode != 0) {
+    EXPECT_NE(result.err.find("photosphere: error: "), std::string::npos) << result.err;
+    EXPECT_EQ(namesIn(s_folder->path()), before);
+  }
+}
+
+const Case kUsage[] = {
+    {"NoCommand", {}, 2, "subcommand"},
+    {"UnknownCommand", {"transmogrify"}, 2, "transmogrify"},
+    {"UnknownOption", {"convert", "smoke.vdb", "-o", "x.vdb", "--bogus"}, 2, "--bogus"},
+    {"MissingOutput", {"convert", "smoke.vdb"}, 2, "--output"},
+    {"MissingInput", {"convert", "-o", "x.vdb"}, 2, "IN"},
+    {"OutputExtension", {"convert", "smoke.vdb", "-o", "x.txt"}, 2, ".vdb"},
+    {"ThreadsNotANumber", {"list", "-j", "many"}, 2, "--threads"},
+    {"ThreadsNegative", {"list", "-j", "-3"}, 2, "--threads"},
+    {"VerboseAndQuiet", {"list", "-v", "-q"}, 2, "--quiet"},
+    {"ProgressStyle", {"list", "--progress", "spinner"}, 2, "spinner"},
+    {"ListKind", {"list", "lihgts"}, 2, "did you mean 'lights'"},
+    {"Origin", {"convert", "smoke.vdb", "-o", "x.vdb", "--origin", "1,2"}, 2, "--origin"},
+    {"NegativeRadius", {"convert", "points.ply", "-o", "x.vdb", "--radius", "-1"}, 2, "--radius"},
+    {"FormatOption",
+     {"convert", "points.ply", "-o", "x.vdb", "--format-option", "colour=1"},
+     2,
+     "colour"},
+    {"FrameRange", {"convert", "seq.####.vdb", "-o", "x.####.vdb", "--frames", "1:3"}, 2, "1:3"},
+    {"FramesWithoutToken", {"convert", "smoke.vdb", "-o", "x.vdb", "--frames", "1-3"}, 2, "####"},
+    {"OneOutputManyFrames", {"convert", "seq.####.vdb", "-o", "x.vdb"}, 2, "x.####.vdb"},
+    {"TwoGridsOfOneName", {"convert", "smoke.vdb", "smoke.vdb", "-o", "x.vdb"}, 2, "density"},
+    {"CompareSizes", {"compare", "a.exr", "small.exr"}, 2, ""},
+    {"CompareLayer", {"compare", "a.exr", "b.exr", "--layer", "single"}, 2, "RGB"},
+};
+INSTANTIATE_TEST_SUITE_P(Usage, ExitCodes, ::testing::ValuesIn(kUsage),
+                         [](const auto& info) { return std::string(info.param.name); });
+
+const Case kFiles[] = {
+    {"ConvertMissing", {"convert", "none.vdb", "-o", "x.vdb"}, 3, "none.vdb"},
+    {"ConvertNoMatch", {"convert", "none.####.vdb", "-o", "x.####.vdb"}, 3, "none.####.vdb"},
+    {"ConvertMissingFrame",
+     {"convert", "seq.####.vdb", "-o", "x.####.vdb", "--frames", "7"},
+     3,
+     "seq.0007.vdb"},
+    {"ConvertDamaged", {"convert", "cut.vdb", "-o", "x.vdb"}, 4, "cut.vdb"},
+    {"ConvertEmpty", {"convert", "empty.ply", "-o", "x.vdb"}, 4, "empty.ply"},
+    {"ConvertForeign", {"convert", "scene.abc", "-o", "x.vdb"}, 4, "export"},
+    {"InspectMissing", {"inspect", "none.vdb"}, 3, "none.vdb"},
+    {"CompareMissing", {"compare", "a.exr", "none.exr"}, 3, "none.exr"},
+    {"CompareDamaged", {"compare", "cut.exr", "a.exr"}, 4, "cut.exr"},
+    {"TargetIsFolder", {"convert", "smoke.vdb", "-o", "folder.vdb"}, 6, "folder.vdb"},
+    {"FullDeviceVdb", {"convert", "smoke.vdb", "-o", "full.vdb"}, 6, "full.vdb"},
+    {"FullDevicePly", {"convert", "points.ply", "-o", "full.ply"}, 6, "full.ply"},
+    {"FullDeviceErrorMap", {"compare", "a.exr", "b.exr", "--error-map", "/dev/full"}, 6, "full"},
+    {"Tolerance", {"compare", "b.exr", "a.exr", "--tolerance", "0.01"}, 7, "tolerance"},
+};
+INSTANTIATE_TEST_SUITE_P(Files, ExitCodes, ::testing::ValuesIn(kFiles),
+                         [](const auto& info) { return std::string(info.param.name); });
+
+TEST(ExitCode, DamagedFileIsReportedByInspect) {
+  TemporaryFolder folder;
+  volume::writeVdb(folder / "cut.vdb", {ballOfSmoke(0.1)});
+  truncate(folder / "cut.vdb");
+  const RunResult result = runTool({"inspect", (folder / "cut.vdb").string()});
+  EXPECT_EQ(result.exitCode, 4);
+  EXPECT_NE(result.out.find("cut.vdb"), std::string::npos) << result.out;
+}
+
+TEST(ExitCode, FullStandardOutputIsAnOutputError) {
+  const RunResult result = runShell(std::string(PHOTOSPHERE_TOOL) + " list > /dev/full");
+  EXPECT_EQ(result.exitCode, 6) << result.err;
+  EXPECT_NE(result.err.find("standard output"), std::string::npos);
+}
+
+TEST(ExitCode, ReadOnlyFolderIsAnOutputError) {
+  if (geteuid() == 0) GTEST_SKIP() << "root may write anywhere";
+  TemporaryFolder folder;
+  volume::writeVdb(folder / "smoke.vdb", {ballOfSmoke(0.1)});
+  fs::create_directory(folder / "locked");
+  fs::permissions(folder / "locked", fs::perms::owner_read | fs::perms::owner_exec);
+  const RunResult result = runTool({"convert", "smoke.vdb", "-o", "locked/x.vdb"}, folder.path());
+  fs::permissions(folder / "locked", fs::perms::owner_all);
+  EXPECT_EQ(result.exitCode, 6) << result.err;
+}
+
+// A termination between frames: the delivered ones are whole, no temporary stays.
+TEST(ExitCode, SignalEndsWithItsNumberAndNoTemporaries) {
+  TemporaryFolder folder;
+  volume::writeVdb(folder / "smoke.vdb", {ballOfSmoke(0.1)});
+  const std::string tool = PHOTOSPHERE_TOOL;
+  for (const auto& [signal, code] : {std::pair{"INT", 130}, std::pair{"TERM", 143}}) {
+    // A background process of a shell ignores SIGINT; `timeout` does not.
+    const RunResult result =
+        runShell(std::string("timeout --preserve-status -s ") + signal + " 0.7 " + tool +
+                     " convert smoke.vdb -o out/x.####.vdb --frames 1-1000000 --particles 2000",
+                 folder.path());
+    EXPECT_EQ(result.exitCode, code) << result.err;
+    for (const std::string& name : namesIn(folder / "out")) {
+      EXPECT_EQ(name.find("tmp"), std::string::npos) << name;
+      EXPECT_NO_THROW(volume::readVdb(folder / "out" / name)) << name;
+    }
+    fs::remove_all(folder / "out");
+  }
+}
+
+}  // namespace
+}  // namespace photosphere::test
