@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <variant>
 
 #include "photosphere/core/error.h"
@@ -23,8 +22,8 @@ std::size_t valueCount(const volume::Attribute& attribute) {
 
 }  // namespace
 
-volume::ParticleSet onlyParticles(const std::filesystem::path& path, const CacheContent& content,
-                                  std::string_view format, bool textColumns) {
+WritableParticles onlyParticles(const std::filesystem::path& path, const CacheContent& content,
+                                std::string_view format, bool textColumns) {
   const std::string name = path.string();
   if (content.particles.empty())
     throw ConfigError(fmt::format("{}: {} holds particles, and there are none to write{}", name,
@@ -37,20 +36,21 @@ volume::ParticleSet onlyParticles(const std::filesystem::path& path, const Cache
   if (!content.grids.empty())
     log::warning("{}: {} holds no grids; {} left out (write .vdb to keep them)", name, format,
                  content.grids.size());
-  volume::ParticleSet set = content.particles.front();
-  std::erase_if(set.attributes, [&](const volume::Attribute& attribute) {
-    const bool drop = isText(attribute) && (!textColumns || attribute.arity != 1);
-    if (drop)
+  const volume::ParticleSet& set = content.particles.front();
+  WritableParticles result{set, {}};
+  for (const volume::Attribute& attribute : set.attributes) {
+    if (isText(attribute) && (!textColumns || attribute.arity != 1)) {
       log::warning("{}: {} holds no text; attribute '{}' left out", name, format, attribute.name);
-    return drop;
-  });
-  for (const volume::Attribute& attribute : set.attributes)
+      continue;
+    }
     if (attribute.arity < 1 ||
         valueCount(attribute) != set.size() * static_cast<std::size_t>(attribute.arity))
       throw ConfigError(fmt::format("{}: attribute '{}' has {} values for {} particles of {}", name,
                                     attribute.name, valueCount(attribute), set.size(),
                                     attribute.arity));
-  return set;
+    result.attributes.push_back(&attribute);
+  }
+  return result;
 }
 
 }  // namespace photosphere::caches

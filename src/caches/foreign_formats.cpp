@@ -1,8 +1,5 @@
 #include "foreign_formats.h"
 
-#include <array>
-#include <string>
-
 namespace photosphere::caches {
 
 using namespace std::string_view_literals;

@@ -69,7 +69,8 @@ struct Deflate::State {
 };
 
 Deflate::Deflate(ByteWriter& file) : m_file(file), m_state(std::make_unique<State>()) {
-  if (deflateInit(&m_state->stream, 4) != Z_OK) throw MemoryError("no memory to compress");
+  if (deflateInit(&m_state->stream, Z_BEST_SPEED) != Z_OK)
+    throw MemoryError("no memory to compress");
 }
 
 Deflate::~Deflate() {

@@ -13,12 +13,13 @@ namespace {
 std::vector<bool> wantsUnscattered(const transport::LightList& lights,
                                    const LightFieldLayout& layout) {
   std::vector<bool> wants;
-  for (const auto& light : lights) wants.push_back(layout.unscattered && !light->isDelta());
+  for (const auto& light : lights)
+    wants.push_back(layout.unscattered && !light->isDelta());
   return wants;
 }
 
-// The set a flight belongs to: 0 = light scattered before, 1 = light as its lamp sent it. -1 = none:
-// the lamp's own light is evaluated at march time.
+// The set a flight belongs to: 0 = light scattered before, 1 = light as its lamp sent it. -1 =
+// none: the lamp's own light is evaluated at march time.
 int setOf(const Flight& flight, const std::vector<bool>& wantsUnscattered) {
   if (flight.scatterings > 0) return 0;
   return wantsUnscattered[flight.light] ? 1 : -1;
@@ -39,7 +40,8 @@ void FixedSums::add(std::size_t at, double value, std::uint32_t bits) {
 std::uint32_t roundingBits(RandomKey key, std::uint64_t photon, std::uint32_t flight,
                            std::uint32_t deposit) {
   // A hash is enough here: the bits only decide the direction of rounding (murmur3's finaliser).
-  std::uint64_t h = photon * 0x9e3779b97f4a7c15ull ^ (static_cast<std::uint64_t>(flight) << 32 | deposit) ^
+  std::uint64_t h = photon * 0x9e3779b97f4a7c15ull ^
+                    (static_cast<std::uint64_t>(flight) << 32 | deposit) ^
                     (static_cast<std::uint64_t>(key.hi) << 32 | key.lo);
   h ^= h >> 33;
   h *= 0xff51afd7ed558ccdull;
@@ -79,7 +81,8 @@ void VoxelSink::depositTrack(const Flight& flight, std::size_t set) const {
   m_lattice.walk(flight.origin, flight.direction, flight.length,
                  [&](std::size_t voxel, float entry, float length) {
                    const Vec3f middle = flight.origin + flight.direction * (entry + 0.5f * length);
-                   add(flight, voxel * stride + offset, flight.power * length, middle, bin, counter);
+                   add(flight, voxel * stride + offset, flight.power * length, middle, bin,
+                       counter);
                  });
 }
 
@@ -101,7 +104,8 @@ void VoxelSink::add(const Flight& flight, std::size_t base, const Rgb& powerLeng
   const int channels = m_layout.channels;
   if (m_layout.basis == Basis::histogram) {
     for (int c = 0; c < channels; ++c)
-      m_sums.add(base + static_cast<std::size_t>(bin * channels + c), static_cast<double>(powerLength[c]),
+      m_sums.add(base + static_cast<std::size_t>(bin * channels + c),
+                 static_cast<double>(powerLength[c]),
                  roundingBits(m_key, flight.photon, flight.ordinal, counter++));
     return;
   }
@@ -118,7 +122,8 @@ void VoxelSink::add(const Flight& flight, std::size_t base, const Rgb& powerLeng
 
 ParticleIndex::ParticleIndex(const std::vector<Vec3f>& positions, double cellEdge) {
   Box3f box;
-  for (const Vec3f& p : positions) box.grow(p);
+  for (const Vec3f& p : positions)
+    box.grow(p);
   if (box.empty()) box = {Vec3f(0.0f), Vec3f(0.0f)};
   m_min = box.min;
   // At most about one cell a particle in a full box: a tiny radius must not ask for all memory.
@@ -126,17 +131,21 @@ ParticleIndex::ParticleIndex(const std::vector<Vec3f>& positions, double cellEdg
   double edge = std::max(cellEdge, 1e-30);
   const double limit = 4.0 * static_cast<double>(positions.size()) + 64.0;
   auto cells = [&](int a) { return std::floor(extent[a] / edge) + 1.0; };
-  while (cells(0) * cells(1) * cells(2) > limit) edge *= 1.5;
+  while (cells(0) * cells(1) * cells(2) > limit)
+    edge *= 1.5;
   m_edge = static_cast<float>(edge);
   m_inverseEdge = static_cast<float>(1.0 / edge);
-  for (int a = 0; a < 3; ++a) m_dims[a] = static_cast<int>(cells(a)) + 1;
+  for (int a = 0; a < 3; ++a)
+    m_dims[a] = static_cast<int>(cells(a)) + 1;
   m_start.assign(static_cast<std::size_t>(m_dims.x) * static_cast<std::size_t>(m_dims.y) *
                          static_cast<std::size_t>(m_dims.z) +
                      1,
                  0);
   auto clampedCell = [&](const Vec3f& p) { return glm::clamp(cellOf(p), Vec3i(0), m_dims - 1); };
-  for (const Vec3f& p : positions) ++m_start[index(clampedCell(p)) + 1];
-  for (std::size_t i = 1; i < m_start.size(); ++i) m_start[i] += m_start[i - 1];
+  for (const Vec3f& p : positions)
+    ++m_start[index(clampedCell(p)) + 1];
+  for (std::size_t i = 1; i < m_start.size(); ++i)
+    m_start[i] += m_start[i - 1];
   std::vector<std::uint32_t> next(m_start.begin(), m_start.end() - 1);
   m_original.resize(positions.size());
   m_positions.resize(positions.size());
@@ -161,7 +170,8 @@ std::size_t ParticleIndex::nearest(const Vec3f& p) const {
     for (int z = std::max(0, c.z - ring); z <= std::min(c.z + ring, m_dims.z - 1); ++z)
       for (int y = std::max(0, c.y - ring); y <= std::min(c.y + ring, m_dims.y - 1); ++y)
         for (int x = std::max(0, c.x - ring); x <= std::min(c.x + ring, m_dims.x - 1); ++x) {
-          if (std::max(std::abs(x - c.x), std::max(std::abs(y - c.y), std::abs(z - c.z))) != ring) continue;
+          if (std::max(std::abs(x - c.x), std::max(std::abs(y - c.y), std::abs(z - c.z))) != ring)
+            continue;
           const std::size_t cell = index({x, y, z});
           for (std::uint32_t i = m_start[cell]; i < m_start[cell + 1]; ++i) {
             const Vec3f d = m_positions[i] - p;
@@ -172,8 +182,8 @@ std::size_t ParticleIndex::nearest(const Vec3f& p) const {
             }
           }
         }
-    // Clamping to the box of cells brings no particle nearer than it is, so whatever lies beyond this
-    // ring is at least `ring` cells away.
+    // Clamping to the box of cells brings no particle nearer than it is, so whatever lies beyond
+    // this ring is at least `ring` cells away.
     const float reach = static_cast<float>(ring) * m_edge;
     if (bestDistance <= reach * reach) break;
   }
@@ -236,7 +246,8 @@ void ParticleSink::deposit(const Flight& flight, std::size_t set,
                           : m_medium.phases()[static_cast<std::size_t>(k)].evaluate(
                                 flight.direction, m_view.toEye(m_positions[target.first]));
       for (int c = 0; c < channels; ++c)
-        m_sums.add(base + static_cast<std::size_t>((m_layout.basis == Basis::histogram ? bin : k) * channels + c),
+        m_sums.add(base + static_cast<std::size_t>(
+                              (m_layout.basis == Basis::histogram ? bin : k) * channels + c),
                    static_cast<double>(power[c]) * static_cast<double>(f),
                    roundingBits(m_key, flight.photon, flight.ordinal, counter++));
     }

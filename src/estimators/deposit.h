@@ -28,15 +28,15 @@ std::uint32_t roundingBits(RandomKey key, std::uint64_t photon, std::uint32_t fl
 class VoxelSink final : public transport::FlightSink {
  public:
   VoxelSink(const transport::Medium& medium, const transport::LightList& lights,
-            const LightFieldLayout& layout, const View& view, const transport::SupportLattice& lattice,
-            RandomKey key, FixedSums& sums);
+            const LightFieldLayout& layout, const View& view,
+            const transport::SupportLattice& lattice, RandomKey key, FixedSums& sums);
   void consume(std::span<const transport::Flight> flights) override;
 
  private:
   void depositTrack(const transport::Flight& flight, std::size_t set) const;
   void depositCollision(const transport::Flight& flight, std::size_t set) const;
-  void add(const transport::Flight& flight, std::size_t base, const Rgb& powerLength, const Vec3f& at,
-           int bin, std::uint32_t& counter) const;
+  void add(const transport::Flight& flight, std::size_t base, const Rgb& powerLength,
+           const Vec3f& at, int bin, std::uint32_t& counter) const;
 
   const transport::Medium& m_medium;
   LightFieldLayout m_layout;
@@ -63,7 +63,8 @@ class ParticleIndex {
           for (std::uint32_t i = m_start[cell]; i < m_start[cell + 1]; ++i) {
             const Vec3f d = m_positions[i] - p;
             const float distance = glm::dot(d, d);
-            if (distance <= radius * radius) visit(static_cast<std::size_t>(m_original[i]), distance);
+            if (distance <= radius * radius)
+              visit(static_cast<std::size_t>(m_original[i]), distance);
           }
         }
   }
@@ -90,8 +91,9 @@ class ParticleIndex {
 class ParticleSink final : public transport::FlightSink {
  public:
   ParticleSink(const transport::Medium& medium, const transport::LightList& lights,
-               const LightFieldLayout& layout, const View& view, const std::vector<Vec3f>& positions,
-               const ParticleIndex& index, RandomKey key, FixedSums& sums);
+               const LightFieldLayout& layout, const View& view,
+               const std::vector<Vec3f>& positions, const ParticleIndex& index, RandomKey key,
+               FixedSums& sums);
   void consume(std::span<const transport::Flight> flights) override;
   std::uint64_t farPhotons() const { return m_far; }
 
@@ -115,9 +117,12 @@ class ParticleSink final : public transport::FlightSink {
 inline float kernelWeight(SpatialKernel kernel, float relativeSquared) {
   if (!(relativeSquared <= 1.0f)) return 0.0f;
   switch (kernel) {
-    case SpatialKernel::epanechnikov: return 1.0f - relativeSquared;
-    case SpatialKernel::box: return 1.0f;
-    case SpatialKernel::gaussian: return fastExp(-4.5f * relativeSquared);  // cut at 3 sigma = radius
+    case SpatialKernel::epanechnikov:
+      return 1.0f - relativeSquared;
+    case SpatialKernel::box:
+      return 1.0f;
+    case SpatialKernel::gaussian:
+      return fastExp(-4.5f * relativeSquared);  // cut at 3 sigma = radius
   }
   return 0.0f;
 }

@@ -20,16 +20,18 @@ namespace {
 double totalPower(const Medium& medium, const transport::LightList& lights) {
   const lights::BoundingSphere bounds = transport::boundingSphere(medium);
   double power = 0;
-  for (const auto& light : lights) power += std::max(0.0, maxComponent(Vec3d(light->power(bounds))));
+  for (const auto& light : lights)
+    power += std::max(0.0, maxComponent(Vec3d(light->power(bounds))));
   return power;
 }
 
 void checkSums(const FixedSums& sums) {
   if (sums.overflows > 0)
-    throw Error(ExitCode::unspecified,
-                fmt::format("{} photon deposits overflowed their 64-bit sums; lower estimator.photons "
-                            "or raise estimator.light_voxel",
-                            sums.overflows.load()));
+    throw Error(
+        ExitCode::unspecified,
+        fmt::format("{} photon deposits overflowed their 64-bit sums; lower estimator.photons "
+                    "or raise estimator.light_voxel",
+                    sums.overflows.load()));
 }
 
 std::vector<float> toFloats(const FixedSums& sums, double scale) {
@@ -52,7 +54,8 @@ void traceVoxels(const Medium& medium, const transport::LightList& lights, const
   const double edge = field.layout.lightVoxel * medium.voxelEdge();
   field.lattice = transport::SupportLattice(medium, edge, marginOf(field.layout, edge));
   FixedSums sums;
-  sums.sums.assign(field.lattice.size() * static_cast<std::size_t>(field.layout.valuesPerCarrier()), 0);
+  sums.sums.assign(field.lattice.size() * static_cast<std::size_t>(field.layout.valuesPerCarrier()),
+                   0);
   // The quantum is fixed by the scene (METHOD.md section 6): lamp power times the smoke's diameter.
   const double power = totalPower(medium, lights);
   const double diameter = 2.0 * transport::boundingSphere(medium).radius;
@@ -61,14 +64,16 @@ void traceVoxels(const Medium& medium, const transport::LightList& lights, const
   statistics = transport::tracePhotons(medium, lights, options, sink);
   checkSums(sums);
   const double volume = edge * edge * edge;
-  field.values = toFloats(sums, 1.0 / (static_cast<double>(std::max<std::uint64_t>(1, options.photons)) * volume));
+  field.values = toFloats(
+      sums, 1.0 / (static_cast<double>(std::max<std::uint64_t>(1, options.photons)) * volume));
 }
 
 void traceCollisionsOnParticles(const Medium& medium, const transport::LightList& lights,
                                 const View& view, const transport::TraceOptions& options,
                                 transport::TraceStatistics& statistics, LightField& field) {
   FixedSums sums;
-  sums.sums.assign(field.particles.size() * static_cast<std::size_t>(field.layout.valuesPerCarrier()), 0);
+  sums.sums.assign(
+      field.particles.size() * static_cast<std::size_t>(field.layout.valuesPerCarrier()), 0);
   const double power = totalPower(medium, lights);
   sums.quantum = power > 0 ? power * 0x1p-24 : 1.0;
   const ParticleIndex index(field.particles, field.layout.depositRadius);
@@ -76,20 +81,22 @@ void traceCollisionsOnParticles(const Medium& medium, const transport::LightList
   statistics = transport::tracePhotons(medium, lights, options, sink);
   checkSums(sums);
   field.farPhotons = sink.farPhotons();
-  field.values = toFloats(sums, 1.0 / static_cast<double>(std::max<std::uint64_t>(1, options.photons)));
+  field.values =
+      toFloats(sums, 1.0 / static_cast<double>(std::max<std::uint64_t>(1, options.photons)));
 }
 
 }  // namespace
 
-double automaticRadius(const Medium& medium, const LightFieldLayout& layout, std::uint64_t photons) {
+double automaticRadius(const Medium& medium, const LightFieldLayout& layout,
+                       std::uint64_t photons) {
   if (medium.bounds().empty()) return 0.0;
   const double edge = layout.lightVoxel * medium.voxelEdge();
   const Vec3d cells = glm::max(medium.bounds().extent() / edge, Vec3d(1.0));
   const double voxels = cells.x * cells.y * cells.z;
   const double across = std::cbrt(voxels);
   // Crossings of one voxel if photons filled the box evenly, each crossing it about twice.
-  const double crossings =
-      std::max(1e-6, 2.0 * static_cast<double>(std::max<std::uint64_t>(1, photons)) * across / voxels);
+  const double crossings = std::max(
+      1e-6, 2.0 * static_cast<double>(std::max<std::uint64_t>(1, photons)) * across / voxels);
   constexpr double kWanted = 600.0;
   const double radius = edge * std::cbrt(kWanted / (crossings * 4.0 / 3.0 * kPi));
   return std::clamp(radius, 0.5 * edge, 4.0 * edge);
@@ -105,8 +112,9 @@ LightField traceLightField(const Medium& medium, const transport::LightList& lig
   field.photons = options.photons;
   if (layout.carrier == Carrier::particles) {
     if (particles.empty())
-      throw ConfigError("estimator.carrier = \"particles\": the volume has no particles; `photosphere "
-                        "convert` seeds them in a grid, or use carrier = \"voxels\"");
+      throw ConfigError(
+          "estimator.carrier = \"particles\": the volume has no particles; `photosphere "
+          "convert` seeds them in a grid, or use carrier = \"voxels\"");
     field.particles = particles;
   }
   if (layout.holdsPower()) {

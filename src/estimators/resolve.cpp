@@ -66,7 +66,8 @@ Colours foldPhase(const LightField& field, const View& view, std::size_t set, in
 }
 
 // Mean extinction of each light voxel, over a few points inside it.
-std::vector<float> meanExtinction(const Medium& medium, const SupportLattice& lattice, double lightVoxel) {
+std::vector<float> meanExtinction(const Medium& medium, const SupportLattice& lattice,
+                                  double lightVoxel) {
   std::vector<float> mean(lattice.size());
   const int n = std::clamp(static_cast<int>(std::ceil(lightVoxel)), 2, 4);
   const auto step = static_cast<float>(lattice.edge() / n);
@@ -104,8 +105,8 @@ std::vector<Tap> kernelTaps(SpatialKernel kernel, double radiusInVoxels) {
   return taps;
 }
 
-// The mean of plain and extinction-weighted smoothing (METHOD.md section 5.3): each alone is off at the
-// smoke's edge, with opposite sign.
+// The mean of plain and extinction-weighted smoothing (METHOD.md section 5.3): each alone is off at
+// the smoke's edge, with opposite sign.
 Colours smoothVoxels(const SupportLattice& lattice, const Colours& colours,
                      const std::vector<float>& extinction, const std::vector<Tap>& taps) {
   if (taps.size() == 1) return colours;
@@ -133,7 +134,8 @@ Colours smoothVoxels(const SupportLattice& lattice, const Colours& colours,
 }
 
 // Gives voxels that no particle reached the mean of their neighbours, ring by ring.
-void fillUnreached(const SupportLattice& lattice, Colours& colours, std::vector<std::uint8_t>& reached) {
+void fillUnreached(const SupportLattice& lattice, Colours& colours,
+                   std::vector<std::uint8_t>& reached) {
   while (true) {
     std::vector<std::pair<std::size_t, Vec4f>> fresh;
     for (std::size_t i = 0; i < colours.size(); ++i) {
@@ -159,8 +161,8 @@ void fillUnreached(const SupportLattice& lattice, Colours& colours, std::vector<
 }
 
 // Particle values gathered at the voxels of a lattice.
-Colours gatherParticles(const LightField& field, const Medium& medium, const SupportLattice& lattice,
-                        const Colours& colours) {
+Colours gatherParticles(const LightField& field, const Medium& medium,
+                        const SupportLattice& lattice, const Colours& colours) {
   const LightFieldLayout& layout = field.layout;
   const double radius = std::max(layout.radius, 1e-12);
   const ParticleIndex index(field.particles, radius);
@@ -206,14 +208,15 @@ Colours gatherParticles(const LightField& field, const Medium& medium, const Sup
 }
 
 Field layOut(const SupportLattice& lattice, const Colours& colours) {
-  return Field(Vec3i(0), lattice.bricks(), lattice.activeBricks(), [&](const Vec3i& brick, Vec4f* nodes) {
-    for (int z = 0; z < Field::kNodes; ++z)
-      for (int y = 0; y < Field::kNodes; ++y)
-        for (int x = 0; x < Field::kNodes; ++x) {
-          const std::int32_t n = lattice.number(brick * 8 + Vec3i(x, y, z));
-          *nodes++ = n >= 0 ? colours[static_cast<std::size_t>(n)] : Vec4f(0.0f);
-        }
-  });
+  return Field(Vec3i(0), lattice.bricks(), lattice.activeBricks(),
+               [&](const Vec3i& brick, Vec4f* nodes) {
+                 for (int z = 0; z < Field::kNodes; ++z)
+                   for (int y = 0; y < Field::kNodes; ++y)
+                     for (int x = 0; x < Field::kNodes; ++x) {
+                       const std::int32_t n = lattice.number(brick * 8 + Vec3i(x, y, z));
+                       *nodes++ = n >= 0 ? colours[static_cast<std::size_t>(n)] : Vec4f(0.0f);
+                     }
+               });
 }
 
 // The resolved field: one brick field per set and phase function, nodes at light-voxel centres.
@@ -226,7 +229,8 @@ class ResolvedField final : public InscatterSource {
     SupportLattice own;
     if (field.layout.carrier == Carrier::particles)
       own = SupportLattice(medium, field.layout.lightVoxel * medium.voxelEdge(), 1);
-    const SupportLattice& lattice = field.layout.carrier == Carrier::particles ? own : field.lattice;
+    const SupportLattice& lattice =
+        field.layout.carrier == Carrier::particles ? own : field.lattice;
     m_inverseEdge = static_cast<float>(1.0 / lattice.edge());
     m_firstNode = Vec3f(lattice.origin() + 0.5 * lattice.edge());
     std::vector<float> extinction;
@@ -239,10 +243,9 @@ class ResolvedField final : public InscatterSource {
       for (int k = 0; k < m_phases; ++k) {
         const Colours folded =
             foldPhase(field, view, set, k, medium.phases()[static_cast<std::size_t>(k)]);
-        m_fields.push_back(
-            layOut(lattice, field.layout.carrier == Carrier::voxels
-                                ? smoothVoxels(lattice, folded, extinction, taps)
-                                : gatherParticles(field, medium, lattice, folded)));
+        m_fields.push_back(layOut(lattice, field.layout.carrier == Carrier::voxels
+                                               ? smoothVoxels(lattice, folded, extinction, taps)
+                                               : gatherParticles(field, medium, lattice, folded)));
       }
   }
 

@@ -24,11 +24,13 @@ std::vector<float> sampleAtParticles(const LightField& field, const std::vector<
         const float w = (c.x ? f.x : 1 - f.x) * (c.y ? f.y : 1 - f.y) * (c.z ? f.z : 1 - f.z);
         if (n < 0 || !(w > 0.0f)) continue;
         const float* source = field.values.data() + static_cast<std::size_t>(n) * stride;
-        for (std::size_t k = 0; k < stride; ++k) target[k] += w * source[k];
+        for (std::size_t k = 0; k < stride; ++k)
+          target[k] += w * source[k];
         total += w;
       }
       if (total > 0.0f)
-        for (std::size_t k = 0; k < stride; ++k) target[k] /= total;
+        for (std::size_t k = 0; k < stride; ++k)
+          target[k] /= total;
     }
   });
   return out;

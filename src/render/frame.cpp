@@ -10,73 +10,42 @@ namespace photosphere::render {
 
 namespace {
 
-constexpr int kTile = 16;
+constexpr int kBandRows = 16;
+constexpr int kChunk = 16;          // pixels of a row that one task traces
+constexpr int kSamplesAtOnce = 16;  // bounds the samples kept, whatever render.samples is
 
-double defaultWidth(FilterKind filter) {
-  switch (filter) {
-    case FilterKind::box: return 1.0;
-    case FilterKind::triangle: return 2.0;
-    case FilterKind::blackmanHarris: return 3.0;
-  }
-  return 1.0;
+bool finite(const Rgb& c) {
+  return std::isfinite(c.x) && std::isfinite(c.y) && std::isfinite(c.z);
 }
 
-// Blackman-Harris window over [0, 1] (Harris 1978, four terms).
-double blackmanHarris(double x) {
-  const double a = 2 * kPi * x;
-  return 0.35875 - 0.48829 * std::cos(a) + 0.14128 * std::cos(2 * a) - 0.01168 * std::cos(3 * a);
+bool isNan(const RayRadiance& r) {
+  return !finite(r.total() + r.transmittance) || !std::isfinite(r.depth) ||
+         !std::isfinite(r.opacity);
 }
 
-// Inverse of the window's cumulative distribution, tabulated once.
-double sampleBlackmanHarris(double u) {
-  constexpr int kSize = 1024;
-  static const std::array<double, kSize + 1> inverse = [] {
-    std::array<double, kSize + 1> table{};
-    constexpr int fine = 1 << 16;
-    std::vector<double> cumulative(fine + 1, 0.0);
-    for (int i = 0; i < fine; ++i)
-      cumulative[static_cast<std::size_t>(i) + 1] =
-          cumulative[static_cast<std::size_t>(i)] + blackmanHarris((i + 0.5) / fine);
-    int at = 0;
-    for (int i = 0; i <= kSize; ++i) {
-      const double target = cumulative.back() * i / kSize;
-      while (at < fine && cumulative[static_cast<std::size_t>(at) + 1] < target) ++at;
-      table[static_cast<std::size_t>(i)] = static_cast<double>(at) / fine;
-    }
-    table[kSize] = 1.0;
-    return table;
-  }();
-  const double x = u * kSize;
-  const auto i = static_cast<std::size_t>(std::min(x, kSize - 1.0));
-  return inverse[i] + (inverse[i + 1] - inverse[i]) * (x - static_cast<double>(i));
+bool isNegative(const RayRadiance& r) {
+  for (const Rgb* layer : {&r.single, &r.multiple, &r.emission, &r.background})
+    if (layer->x < 0 || layer->y < 0 || layer->z < 0) return true;
+  return false;
 }
 
+// Weighted sum of samples; the same fields as one.
 struct PixelSum {
   RayRadiance sum;
-  std::uint64_t nans = 0, negatives = 0;
-};
+  float weight = 0.0f;
 
-bool finite(const Rgb& c) { return std::isfinite(c.x) && std::isfinite(c.y) && std::isfinite(c.z); }
-
-void addSample(PixelSum& pixel, const RayRadiance& r) {
-  const Rgb total = r.total() + r.transmittance + Rgb(r.depth);
-  if (!finite(total)) {
-    ++pixel.nans;
-    return;
+  PixelSum() { sum.transmittance = Rgb(0.0f); }
+  void add(const RayRadiance& r, float w) {
+    sum.single += w * r.single;
+    sum.multiple += w * r.multiple;
+    sum.emission += w * r.emission;
+    sum.background += w * r.background;
+    sum.transmittance += w * r.transmittance;
+    sum.depth += w * r.depth;
+    sum.opacity += w * r.opacity;
+    weight += w;
   }
-  for (const Rgb* layer : {&r.single, &r.multiple, &r.emission, &r.background})
-    if (layer->x < 0 || layer->y < 0 || layer->z < 0) {
-      ++pixel.negatives;
-      break;
-    }
-  pixel.sum.single += r.single;
-  pixel.sum.multiple += r.multiple;
-  pixel.sum.emission += r.emission;
-  pixel.sum.background += r.background;
-  pixel.sum.transmittance += r.transmittance;
-  pixel.sum.depth += r.depth;
-  pixel.sum.opacity += r.opacity;
-}
+};
 
 void merge(IntegratorCounters& a, const IntegratorCounters& b) {
   a.tracking.majorantViolations += b.tracking.majorantViolations;
@@ -86,20 +55,193 @@ void merge(IntegratorCounters& a, const IntegratorCounters& b) {
   a.cappedRadiance += b.cappedRadiance;
 }
 
+// Offset of sample s from the pixel centre: the R2 sequence (Roberts 2018), the same in every
+// pixel, so that the samples of a frame form shifted lattices.
+Vec2d sampleOffset(int s) {
+  Vec2d u(0.5 + 0.7548776662466927 * s, 0.5 + 0.5698402909980532 * s);
+  return u - glm::floor(u) - 0.5;
+}
+
+// Traces the samples of a frame band by band and filters them into pixels.
+class FrameLoop {
+ public:
+  FrameLoop(const cameras::Camera& camera, const Integrator& integrator,
+            const FrameOptions& options, FrameLayers& out)
+      : m_camera(camera),
+        m_integrator(integrator),
+        m_options(options),
+        m_out(out),
+        m_filter(options.filter, options.filterWidth),
+        m_border(static_cast<int>(std::ceil(m_filter.radius() - 0.5))),
+        m_axis(camera.viewDirection()),
+        m_sums(static_cast<std::size_t>(out.width()) * static_cast<std::size_t>(out.height())) {}
+
+  void run() {
+    const auto rows = static_cast<std::uint64_t>(m_out.height() + 2 * m_border);
+    Progress progress("render", rows * static_cast<std::uint64_t>(m_options.samples));
+    for (int first = 0; first < m_options.samples; first += kSamplesAtOnce)
+      pass(first, std::min(m_options.samples, first + kSamplesAtOnce), progress);
+    finish();
+  }
+
+ private:
+  int sampleRowWidth() const { return m_out.width() + 2 * m_border; }
+
+  // One pass over the frame with samples [firstSample, endSample) of every pixel.
+  void pass(int firstSample, int endSample, Progress& progress) {
+    m_count = endSample - firstSample;
+    for (int s = firstSample; s < endSample; ++s)
+      m_offsets[static_cast<std::size_t>(s - firstSample)] = sampleOffset(s);
+    const int top = m_out.crop.min.y - m_border, bottom = m_out.crop.max.y + m_border;
+    std::vector<std::vector<RayRadiance>> rows;  // traced, from row `kept` on
+    int kept = top, traced = top;
+    for (int y0 = m_out.crop.min.y; y0 < m_out.crop.max.y; y0 += kBandRows) {
+      const int y1 = std::min(y0 + kBandRows, m_out.crop.max.y);
+      const int needed = std::min(y1 + m_border, bottom);
+      rows.resize(static_cast<std::size_t>(needed - kept));
+      traceRows(rows, kept, traced, needed, firstSample);
+      progress.add(static_cast<std::uint64_t>(needed - traced) *
+                   static_cast<std::uint64_t>(m_count));
+      traced = needed;
+      parallelFor(static_cast<std::size_t>(y1 - y0), 1, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i)
+          filterRow(rows, kept, y0 + static_cast<int>(i));
+      });
+      const int keep = y1 - m_border;
+      rows.erase(rows.begin(), rows.begin() + (keep - kept));
+      kept = keep;
+    }
+  }
+
+  void traceRows(std::vector<std::vector<RayRadiance>>& rows, int kept, int begin, int end,
+                 int firstSample) {
+    const int width = sampleRowWidth();
+    for (int y = begin; y < end; ++y)
+      rows[static_cast<std::size_t>(y - kept)].resize(static_cast<std::size_t>(width * m_count));
+    const int chunks = (width + kChunk - 1) / kChunk;
+    parallelFor(static_cast<std::size_t>(chunks) * static_cast<std::size_t>(end - begin), 1,
+                [&](std::size_t first, std::size_t last) {
+                  IntegratorCounters counters;
+                  Bad bad;
+                  for (std::size_t task = first; task < last; ++task) {
+                    const int y = begin + static_cast<int>(task / static_cast<std::size_t>(chunks));
+                    const int x0 =
+                        static_cast<int>(task % static_cast<std::size_t>(chunks)) * kChunk;
+                    auto& row = rows[static_cast<std::size_t>(y - kept)];
+                    for (int x = x0; x < std::min(x0 + kChunk, width); ++x)
+                      tracePixel(&row[static_cast<std::size_t>(x * m_count)],
+                                 m_out.crop.min.x - m_border + x, y, firstSample, counters, bad);
+                  }
+                  report(counters, bad);
+                });
+  }
+
+  struct Bad {
+    std::uint64_t nans = 0, negatives = 0;
+    Vec2i first{-1};
+  };
+
+  void tracePixel(RayRadiance* samples, int x, int y, int firstSample, IntegratorCounters& counters,
+                  Bad& bad) {
+    // Distinct for every pixel, also of the border beyond the frame.
+    const auto pixel =
+        static_cast<std::uint64_t>(y + 65536) << 20 | static_cast<std::uint64_t>(x + 65536);
+    for (int s = 0; s < m_count; ++s) {
+      Rng rng(m_options.key, RandomStream::camera,
+              static_cast<std::uint64_t>(firstSample + s) << 40 | pixel);
+      const Vec2d raster = Vec2d(x + 0.5, y + 0.5) + m_offsets[static_cast<std::size_t>(s)];
+      const cameras::CameraRay ray = m_camera.ray(raster);
+      RayRadiance r = m_integrator.radiance(m_options.space.localFromWorld(ray.origin),
+                                            Vec3f(ray.direction), rng, counters);
+      r.depth *= static_cast<float>(glm::dot(ray.direction, m_axis));
+      const bool nan = isNan(r);
+      if (nan || isNegative(r)) {
+        ++(nan ? bad.nans : bad.negatives);
+        if (bad.first.x < 0) bad.first = Vec2i(x, y);
+      }
+      samples[s] = nan ? RayRadiance{} : r;
+    }
+  }
+
+  void report(const IntegratorCounters& counters, const Bad& bad) {
+    const std::lock_guard lock(m_mutex);
+    merge(m_out.counters, counters);
+    m_out.nanSamples += bad.nans;
+    m_out.negativeSamples += bad.negatives;
+    if (bad.first.x >= 0 && m_out.firstBad.x < 0) m_out.firstBad = bad.first;
+  }
+
+  void filterRow(const std::vector<std::vector<RayRadiance>>& rows, int kept, int y) {
+    const int width = m_out.width();
+    for (int dy = -m_border; dy <= m_border; ++dy) {
+      const auto& row = rows[static_cast<std::size_t>(y + dy - kept)];
+      for (int dx = -m_border; dx <= m_border; ++dx)
+        for (int s = 0; s < m_count; ++s) {
+          const float w = m_filter.weight(Vec2d(dx, dy) + m_offsets[static_cast<std::size_t>(s)]);
+          if (!(w > 0.0f)) continue;
+          for (int x = 0; x < width; ++x)
+            m_sums[static_cast<std::size_t>(y - m_out.crop.min.y) *
+                       static_cast<std::size_t>(width) +
+                   static_cast<std::size_t>(x)]
+                .add(row[static_cast<std::size_t>((x + dx + m_border) * m_count + s)], w);
+        }
+    }
+  }
+
+  void finish() {
+    const double unitsPerMeter = 1.0 / m_options.space.metersPerUnit;
+    for (std::size_t i = 0; i < m_sums.size(); ++i) {
+      const RayRadiance& sum = m_sums[i].sum;
+      const float scale = m_sums[i].weight > 0.0f ? 1.0f / m_sums[i].weight : 0.0f;
+      m_out.single[i] = sum.single * scale;
+      m_out.multiple[i] = sum.multiple * scale;
+      m_out.emission[i] = sum.emission * scale;
+      m_out.background[i] = sum.background * scale;
+      m_out.beauty[i] = sum.total() * scale;
+      m_out.transmittance[i] = sum.transmittance * scale;
+      m_out.alpha[i] = 1.0f - meanComponent(m_out.transmittance[i]);
+      if (sum.opacity * scale > 1e-6f)
+        m_out.depth[i] =
+            static_cast<float>(static_cast<double>(sum.depth / sum.opacity) * unitsPerMeter);
+    }
+  }
+
+  const cameras::Camera& m_camera;
+  const Integrator& m_integrator;
+  const FrameOptions& m_options;
+  FrameLayers& m_out;
+  PixelFilter m_filter;
+  int m_border;
+  Vec3d m_axis;
+  int m_count = 0;
+  std::array<Vec2d, kSamplesAtOnce> m_offsets{};
+  std::vector<PixelSum> m_sums;
+  std::mutex m_mutex;
+};
+
 }  // namespace
 
-Vec2d sampleFilter(FilterKind filter, double width, const Vec2d& u) {
-  const double w = width > 0 ? width : defaultWidth(filter);
-  switch (filter) {
-    case FilterKind::box: return (u - 0.5) * w;
-    case FilterKind::triangle: {
-      auto tent = [](double x) { return x < 0.5 ? std::sqrt(2 * x) - 1 : 1 - std::sqrt(2 - 2 * x); };
-      return Vec2d(tent(u.x), tent(u.y)) * (0.5 * w);
+PixelFilter::PixelFilter(FilterKind kind, double width) : m_kind(kind) {
+  const double own = kind == FilterKind::box ? 1.0 : kind == FilterKind::triangle ? 2.0 : 3.0;
+  m_radius = 0.5 * (width > 0 ? width : own);
+}
+
+float PixelFilter::profile(double x) const {
+  const double t = std::abs(x) / m_radius;  // 0 at the centre, 1 at the edge
+  if (t > 1.0) return 0.0f;
+  switch (m_kind) {
+    case FilterKind::box:
+      return 1.0f;
+    case FilterKind::triangle:
+      return static_cast<float>(1.0 - t);
+    case FilterKind::blackmanHarris: {
+      // Four-term window (Harris 1978), its argument counted from the centre.
+      const double a = kPi * t;
+      return static_cast<float>(0.35875 + 0.48829 * std::cos(a) + 0.14128 * std::cos(2 * a) +
+                                0.01168 * std::cos(3 * a));
     }
-    case FilterKind::blackmanHarris:
-      return (Vec2d(sampleBlackmanHarris(u.x), sampleBlackmanHarris(u.y)) - 0.5) * w;
   }
-  return Vec2d(0.0);
+  return 0.0f;
 }
 
 FrameLayers renderFrame(const cameras::Camera& camera, const Integrator& integrator,
@@ -107,82 +249,14 @@ FrameLayers renderFrame(const cameras::Camera& camera, const Integrator& integra
   FrameLayers out;
   out.crop = options.crop;
   out.resolution = camera.resolution();
-  const int width = out.width(), height = out.height();
-  const auto pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  const auto pixels =
+      static_cast<std::size_t>(out.width()) * static_cast<std::size_t>(out.height());
   for (auto* layer : {&out.beauty, &out.single, &out.multiple, &out.emission, &out.background,
                       &out.transmittance})
     layer->assign(pixels, Rgb(0.0f));
   out.alpha.assign(pixels, 0.0f);
   out.depth.assign(pixels, kNoDepth);
-
-  const int tilesX = (width + kTile - 1) / kTile, tilesY = (height + kTile - 1) / kTile;
-  const auto tiles = static_cast<std::size_t>(tilesX) * static_cast<std::size_t>(tilesY);
-  const Vec3d axis = camera.viewDirection();
-  const double unitsPerMeter = 1.0 / options.space.metersPerUnit;
-  std::mutex mutex;
-  Progress progress("render", pixels);
-
-  auto renderPixel = [&](int x, int y, IntegratorCounters& counters) {
-    PixelSum pixel;
-    pixel.sum.transmittance = Rgb(0.0f);
-    double axisDepth = 0.0;
-    const auto index = static_cast<std::uint64_t>(y) * static_cast<std::uint64_t>(out.resolution.x) +
-                       static_cast<std::uint64_t>(x);
-    // Positions in the pixel: the R2 sequence (Roberts 2018), shifted at random for each pixel.
-    Rng shiftRng(options.key, RandomStream::camera, index);
-    const Vec2d shift(shiftRng.uniformDouble(), shiftRng.uniformDouble());
-    for (int s = 0; s < options.samples; ++s) {
-      Rng rng(options.key, RandomStream::camera,
-              (static_cast<std::uint64_t>(s) + 1) << 40 | index);
-      Vec2d u(shift.x + 0.7548776662466927 * s, shift.y + 0.5698402909980532 * s);
-      u -= glm::floor(u);
-      const Vec2d raster = Vec2d(x + 0.5, y + 0.5) +
-                           sampleFilter(options.filter, options.filterWidth, u);
-      const cameras::CameraRay ray = camera.ray(raster);
-      const RayRadiance r = integrator.radiance(options.space.localFromWorld(ray.origin),
-                                                Vec3f(ray.direction), rng, counters);
-      addSample(pixel, r);
-      axisDepth += static_cast<double>(r.depth) * glm::dot(ray.direction, axis);
-    }
-    const float scale = 1.0f / static_cast<float>(options.samples);
-    const std::size_t at = static_cast<std::size_t>(y - options.crop.min.y) * static_cast<std::size_t>(width) +
-                           static_cast<std::size_t>(x - options.crop.min.x);
-    out.single[at] = pixel.sum.single * scale;
-    out.multiple[at] = pixel.sum.multiple * scale;
-    out.emission[at] = pixel.sum.emission * scale;
-    out.background[at] = pixel.sum.background * scale;
-    out.beauty[at] = pixel.sum.total() * scale;
-    out.transmittance[at] = pixel.sum.transmittance * scale;
-    out.alpha[at] = 1.0f - meanComponent(out.transmittance[at]);
-    if (pixel.sum.opacity > 1e-6f)
-      out.depth[at] = static_cast<float>(axisDepth / static_cast<double>(pixel.sum.opacity) * unitsPerMeter);
-    return pixel;
-  };
-
-  parallelFor(tiles, 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t tile = begin; tile < end; ++tile) {
-      IntegratorCounters counters;
-      std::uint64_t nans = 0, negatives = 0;
-      Vec2i bad(-1);
-      const int x0 = options.crop.min.x + static_cast<int>(tile % static_cast<std::size_t>(tilesX)) * kTile;
-      const int y0 = options.crop.min.y + static_cast<int>(tile / static_cast<std::size_t>(tilesX)) * kTile;
-      const int x1 = std::min(x0 + kTile, options.crop.max.x);
-      const int y1 = std::min(y0 + kTile, options.crop.max.y);
-      for (int y = y0; y < y1; ++y)
-        for (int x = x0; x < x1; ++x) {
-          const PixelSum pixel = renderPixel(x, y, counters);
-          if ((pixel.nans || pixel.negatives) && bad.x < 0) bad = Vec2i(x, y);
-          nans += pixel.nans;
-          negatives += pixel.negatives;
-        }
-      const std::lock_guard lock(mutex);
-      out.nanSamples += nans;
-      out.negativeSamples += negatives;
-      if (bad.x >= 0 && out.firstBad.x < 0) out.firstBad = bad;
-      merge(out.counters, counters);
-      progress.add(static_cast<std::uint64_t>(x1 - x0) * static_cast<std::uint64_t>(y1 - y0));
-    }
-  });
+  FrameLoop(camera, integrator, options, out).run();
   return out;
 }
 

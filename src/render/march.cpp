@@ -10,8 +10,8 @@ using transport::Coefficients;
 using transport::Medium;
 using transport::Segment;
 
-// Transmittance below which the rest of a ray is not marched: far under half-float resolution of what
-// it could still add.
+// Transmittance below which the rest of a ray is not marched: far under half-float resolution of
+// what it could still add.
 constexpr float kOpaque = 1e-5f;
 
 class MarchIntegrator final : public Integrator {
@@ -43,9 +43,10 @@ class MarchIntegrator final : public Integrator {
   }
 
  private:
-  // Steps lie on one lattice along the ray, offset at random, so that neighbouring rays do not band;
-  // cells without extinction are skipped.
-  float march(const Segment& ray, RayRadiance& result, Rng& rng, IntegratorCounters& counters) const {
+  // Steps lie on one lattice along the ray, offset at random, so that neighbouring rays do not
+  // band; cells without extinction are skipped.
+  float march(const Segment& ray, RayRadiance& result, Rng& rng,
+              IntegratorCounters& counters) const {
     float transmittance = 1.0f;
     const float offset = rng.uniform();
     float done = 0.0f;  // the ray is integrated up to here
@@ -133,7 +134,8 @@ class MarchIntegrator final : public Integrator {
   Rgb phased(const Coefficients& c, const Vec3f& wi, const Vec3f& wo) const {
     const auto& phases = m_medium.phases();
     Rgb sum(0.0f);
-    for (std::size_t i = 0; i < phases.size(); ++i) sum += c.scattering[i] * phases[i].evaluate(wi, wo);
+    for (std::size_t i = 0; i < phases.size(); ++i)
+      sum += c.scattering[i] * phases[i].evaluate(wi, wo);
     return sum;
   }
 

@@ -14,7 +14,8 @@ using transport::Segment;
 
 class PathIntegrator final : public Integrator {
  public:
-  PathIntegrator(const Medium& medium, const transport::LightList& lights, const PathOptions& options)
+  PathIntegrator(const Medium& medium, const transport::LightList& lights,
+                 const PathOptions& options)
       : m_medium(medium), m_options(options) {
     for (const auto& light : lights) {
       m_backgrounds.push_back(light.get());
@@ -28,7 +29,8 @@ class PathIntegrator final : public Integrator {
       sum += std::max(0.0, maxComponent(Vec3d(light->power(bounds))));
       m_cumulative.push_back(sum);
     }
-    for (double& c : m_cumulative) c = sum > 0 ? c / sum : 0;
+    for (double& c : m_cumulative)
+      c = sum > 0 ? c / sum : 0;
     if (!(sum > 0)) m_sampled.clear();
   }
 
@@ -44,10 +46,10 @@ class PathIntegrator final : public Integrator {
             : Rgb(1.0f);
     Rgb throughput(1.0f);
     for (int scatterings = 0;; ++scatterings) {
-      const Collision hit = segment.length > 0.0f
-                                ? transport::sampleCollision(m_medium, segment.origin, segment.direction,
-                                                             segment.length, rng, counters.tracking)
-                                : Collision{};
+      const Collision hit = segment.length > 0.0f ? transport::sampleCollision(
+                                                        m_medium, segment.origin, segment.direction,
+                                                        segment.length, rng, counters.tracking)
+                                                  : Collision{};
       if (!hit.happened()) {
         const Vec3f d = scatterings == 0 ? direction : segment.direction;
         addEscape(result, throughput, d, scatterings);
@@ -59,7 +61,8 @@ class PathIntegrator final : public Integrator {
       }
       ++counters.scatterings;
       const Vec3f p = segment.origin + segment.direction * hit.distance;
-      if (!m_options.effects.singleScattering && !m_options.effects.multipleScattering) return result;
+      if (!m_options.effects.singleScattering && !m_options.effects.multipleScattering)
+        return result;
       if (m_options.maxScatter > 0 && scatterings >= m_options.maxScatter) {
         ++counters.capped;
         counters.cappedRadiance += static_cast<double>(meanComponent(throughput));
@@ -86,7 +89,8 @@ class PathIntegrator final : public Integrator {
   }
 
   // Light that the path meets by leaving the smoke after this many scatterings.
-  void addEscape(RayRadiance& result, const Rgb& throughput, const Vec3f& d, int scatterings) const {
+  void addEscape(RayRadiance& result, const Rgb& throughput, const Vec3f& d,
+                 int scatterings) const {
     if (scatterings > 0 && m_options.environment == EnvironmentSampling::nextEvent) return;
     for (const lights::Light* light : m_backgrounds) {
       const Rgb value = throughput * light->background(d);
@@ -134,7 +138,8 @@ class PathIntegrator final : public Integrator {
     Coefficients c;
     m_medium.coefficients(p, c);
     Rgb sum(0.0f);
-    for (std::size_t i = 0; i < phases.size(); ++i) sum += c.scattering[i] * phases[i].evaluate(wi, wo);
+    for (std::size_t i = 0; i < phases.size(); ++i)
+      sum += c.scattering[i] * phases[i].evaluate(wi, wo);
     return c.extinction > 0.0f ? sum / c.extinction : Rgb(0.0f);
   }
 

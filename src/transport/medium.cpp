@@ -24,7 +24,9 @@ void hashField(Hasher& hasher, const volume::BrickField<float>& field, const Mat
       }
 }
 
-bool isGrey(const Rgb& c) { return c.x == c.y && c.y == c.z; }
+bool isGrey(const Rgb& c) {
+  return c.x == c.y && c.y == c.z;
+}
 
 }  // namespace
 
@@ -46,7 +48,8 @@ Medium::Medium(std::vector<MediumVolume> volumes) : m_volumes(std::move(volumes)
   Hasher hasher;
   for (const MediumVolume& v : m_volumes) {
     sources.push_back({&v.density, v.localFromNode, v.densityScale});
-    for (int a = 0; a < 3; ++a) edge = std::min(edge, glm::length(Vec3d(v.localFromNode[a])));
+    for (int a = 0; a < 3; ++a)
+      edge = std::min(edge, glm::length(Vec3d(v.localFromNode[a])));
     int phaseIndex = 0;
     while (phaseIndex < static_cast<int>(m_phases.size()) &&
            m_phases[static_cast<std::size_t>(phaseIndex)].g() != v.phase.g())
@@ -68,11 +71,13 @@ Medium::Medium(std::vector<MediumVolume> volumes) : m_volumes(std::move(volumes)
     hasher.numbers(&v.albedo.x, 3);
     hasher.number(v.phase.g());
     hashField(hasher, v.density, v.localFromNode);
-    for (const auto& field : v.albedoFields) hashField(hasher, field, v.localFromAlbedoNode);
+    for (const auto& field : v.albedoFields)
+      hashField(hasher, field, v.localFromAlbedoNode);
   }
   if (m_phases.size() > static_cast<std::size_t>(kMaxPhases))
-    throw ConfigError(fmt::format("the volumes mix {} different phase functions; at most {} are served",
-                                  m_phases.size(), kMaxPhases));
+    throw ConfigError(
+        fmt::format("the volumes mix {} different phase functions; at most {} are served",
+                    m_phases.size(), kMaxPhases));
   m_uniformAlbedo = m_volumes.size() == 1 && m_albedo.front().fields.empty();
   if (m_phases.empty()) m_phases.emplace_back(0.0);
   if (std::isfinite(edge)) m_voxelEdge = edge;
@@ -90,7 +95,8 @@ Rgb Medium::Albedo::at(const Vec3f& p) const {
 
 void Medium::coefficients(const Vec3f& p, Coefficients& out) const {
   out.extinction = 0.0f;
-  for (std::size_t i = 0; i < m_phases.size(); ++i) out.scattering[i] = Rgb(0.0f);
+  for (std::size_t i = 0; i < m_phases.size(); ++i)
+    out.scattering[i] = Rgb(0.0f);
   for (std::size_t i = 0; i < m_placed.size(); ++i) {
     const Placed& v = m_placed[i];
     const float sigma = v.scale * v.field->sample(v.nodeFromLocal(p));
@@ -104,7 +110,8 @@ std::uint64_t Medium::memoryBytes() const {
   std::uint64_t bytes = m_majorants.memoryBytes();
   for (const MediumVolume& v : m_volumes) {
     bytes += v.density.memoryBytes();
-    for (const auto& field : v.albedoFields) bytes += field.memoryBytes();
+    for (const auto& field : v.albedoFields)
+      bytes += field.memoryBytes();
   }
   return bytes;
 }

@@ -11,11 +11,12 @@ namespace photosphere::transport {
 
 namespace {
 
-constexpr std::size_t kBatch = 1024;          // flights handed to the sink at once
+constexpr std::size_t kBatch = 1024;  // flights handed to the sink at once
 constexpr std::uint64_t kPhotonsPerChunk = 4096;
 
-// The R5 additive recurrence (Roberts 2018) as 64-bit fixed point: photon i takes point i, so births
-// are spread evenly over lights, directions and discs whatever part of the photons a shard traces.
+// The R5 additive recurrence (Roberts 2018) as 64-bit fixed point: photon i takes point i, so
+// births are spread evenly over lights, directions and discs whatever part of the photons a shard
+// traces.
 struct BirthSequence {
   std::array<std::uint64_t, 5> step{}, shift{};
 
@@ -101,8 +102,8 @@ class Batch {
 void follow(const Medium& medium, Flight flight, Rng& rng, Batch& batch, TraceStatistics& stats,
             TrackingCounters& counters) {
   while (true) {
-    const Collision hit = sampleCollision(medium, flight.origin, flight.direction, flight.length,
-                                          rng, counters);
+    const Collision hit =
+        sampleCollision(medium, flight.origin, flight.direction, flight.length, rng, counters);
     if (hit.happened()) flight.length = hit.distance;
     flight.extinctionAtEnd = hit.extinction;
     batch.add(flight);
@@ -174,7 +175,8 @@ TraceStatistics tracePhotons(const Medium& medium, const LightList& lights,
         Rng rng(options.key, RandomStream::photon, photon);
         const std::size_t light = choice.choose(births(photon, 0));
         const lights::Emission birth = lights[light]->emit(
-            bounds, Vec4f(births(photon, 1), births(photon, 2), births(photon, 3), births(photon, 4)));
+            bounds,
+            Vec4f(births(photon, 1), births(photon, 2), births(photon, 3), births(photon, 4)));
         Flight flight;
         flight.power = birth.power / static_cast<float>(choice.probability(light));
         flight.photon = photon;
@@ -196,9 +198,11 @@ TraceStatistics tracePhotons(const Medium& medium, const LightList& lights,
       progress.add(end - begin);
     }
   });
-  for (const TraceStatistics& part : parts) accumulate(total, part);
+  for (const TraceStatistics& part : parts)
+    accumulate(total, part);
   const double scale = options.photons > 0 ? 1.0 / static_cast<double>(options.photons) : 0.0;
-  for (Vec3d* power : {&total.emitted, &total.missed, &total.absorbed, &total.escaped, &total.cappedPower})
+  for (Vec3d* power :
+       {&total.emitted, &total.missed, &total.absorbed, &total.escaped, &total.cappedPower})
     *power *= scale;
   return total;
 }

@@ -22,10 +22,11 @@ class Marks {
 
   void mark(const Vec3i& v) {
     const Vec3i b(v.x >> 3, v.y >> 3, v.z >> 3);
-    std::int32_t& brick = table[(static_cast<std::size_t>(b.z) * static_cast<std::size_t>(m_bricks.y) +
-                                 static_cast<std::size_t>(b.y)) *
-                                    static_cast<std::size_t>(m_bricks.x) +
-                                static_cast<std::size_t>(b.x)];
+    std::int32_t& brick =
+        table[(static_cast<std::size_t>(b.z) * static_cast<std::size_t>(m_bricks.y) +
+               static_cast<std::size_t>(b.y)) *
+                  static_cast<std::size_t>(m_bricks.x) +
+              static_cast<std::size_t>(b.x)];
     if (brick < 0) {
       brick = static_cast<std::int32_t>(masks.size());
       masks.emplace_back();
@@ -42,19 +43,21 @@ class Marks {
                static_cast<std::size_t>(b.y)) *
                   static_cast<std::size_t>(m_bricks.x) +
               static_cast<std::size_t>(b.x)];
-    return brick >= 0 && (masks[static_cast<std::size_t>(brick)][static_cast<std::size_t>(v.z & 7)] >>
-                          ((v.y & 7) * 8 + (v.x & 7))) &
-                             1;
+    return brick >= 0 &&
+           (masks[static_cast<std::size_t>(brick)][static_cast<std::size_t>(v.z & 7)] >>
+            ((v.y & 7) * 8 + (v.x & 7))) &
+               1;
   }
   template <class Visit>
   void forEach(const Visit& visit) const {
     for (int z = 0; z < m_bricks.z; ++z)
       for (int y = 0; y < m_bricks.y; ++y)
         for (int x = 0; x < m_bricks.x; ++x) {
-          const std::int32_t brick = table[(static_cast<std::size_t>(z) * static_cast<std::size_t>(m_bricks.y) +
-                                            static_cast<std::size_t>(y)) *
-                                               static_cast<std::size_t>(m_bricks.x) +
-                                           static_cast<std::size_t>(x)];
+          const std::int32_t brick =
+              table[(static_cast<std::size_t>(z) * static_cast<std::size_t>(m_bricks.y) +
+                     static_cast<std::size_t>(y)) *
+                        static_cast<std::size_t>(m_bricks.x) +
+                    static_cast<std::size_t>(x)];
           if (brick < 0) continue;
           const Mask& mask = masks[static_cast<std::size_t>(brick)];
           for (int i = 0; i < 512; ++i)
@@ -93,7 +96,8 @@ void markSupport(const Medium& medium, const Vec3d& origin, double edge, Marks& 
       const Vec3i lo = Vec3i(glm::floor(center - half)), hi = Vec3i(glm::floor(center + half));
       for (int z = lo.z; z <= hi.z; ++z)
         for (int y = lo.y; y <= hi.y; ++y)
-          for (int x = lo.x; x <= hi.x; ++x) marks.mark({x, y, z});
+          for (int x = lo.x; x <= hi.x; ++x)
+            marks.mark({x, y, z});
     };
     const Vec3i& bricks = field.bricks();
     for (int bz = 0; bz < bricks.z; ++bz)
@@ -138,11 +142,13 @@ SupportLattice::SupportLattice(const Medium& medium, double edge, int margin)
     bool inside = true;  // all neighbours marked: they dilate for this voxel
     for (int z = -1; z <= 1 && inside; ++z)
       for (int y = -1; y <= 1 && inside; ++y)
-        for (int x = -1; x <= 1 && inside; ++x) inside = base.marked(v + Vec3i(x, y, z));
+        for (int x = -1; x <= 1 && inside; ++x)
+          inside = base.marked(v + Vec3i(x, y, z));
     const int reach = inside ? 0 : margin;
     for (int z = -reach; z <= reach; ++z)
       for (int y = -reach; y <= reach; ++y)
-        for (int x = -reach; x <= reach; ++x) dilated.mark(v + Vec3i(x, y, z));
+        for (int x = -reach; x <= reach; ++x)
+          dilated.mark(v + Vec3i(x, y, z));
   });
   dilated.forEach([&](const Vec3i& v) { m_voxels.push_back(v); });
   number();

@@ -36,7 +36,8 @@ BrickField<T>::BrickField(const Vec3i& origin, const Vec3i& bricks,
       for (std::size_t i = begin; i < end; ++i) {
         T* nodes = scratch.data() + i * kBrickSize;
         fetch(candidates[first + i], nodes);
-        uniform[i] = std::all_of(nodes, nodes + kBrickSize, [&](const T& v) { return v == nodes[0]; });
+        uniform[i] =
+            std::all_of(nodes, nodes + kBrickSize, [&](const T& v) { return v == nodes[0]; });
       }
     });
     for (std::size_t i = 0; i < count; ++i) {

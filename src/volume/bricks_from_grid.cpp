@@ -48,7 +48,8 @@ void touch(std::set<Vec3i, CoordLess>& bricks, const openvdb::CoordBBox& box, co
   const Vec3i hi(box.max().x() - origin.x, box.max().y() - origin.y, box.max().z() - origin.z);
   for (int z = (lo.z - 1) >> 3; z <= hi.z >> 3; ++z)
     for (int y = (lo.y - 1) >> 3; y <= hi.y >> 3; ++y)
-      for (int x = (lo.x - 1) >> 3; x <= hi.x >> 3; ++x) bricks.insert({x, y, z});
+      for (int x = (lo.x - 1) >> 3; x <= hi.x >> 3; ++x)
+        bricks.insert({x, y, z});
 }
 
 template <class GridT>
@@ -64,15 +65,17 @@ Field build(const GridT& grid, int c, const std::string& path, bool allowNegativ
   const std::int64_t nx = (cells(lo.x, active.max().x()) + 7) / 8;
   const std::int64_t ny = (cells(lo.y, active.max().y()) + 7) / 8;
   const std::int64_t nz = (cells(lo.z, active.max().z()) + 7) / 8;
-  const double tableBytes = 4.0 * static_cast<double>(nx) * static_cast<double>(ny) * static_cast<double>(nz);
+  const double tableBytes =
+      4.0 * static_cast<double>(nx) * static_cast<double>(ny) * static_cast<double>(nz);
   const double limit = budgetBytes ? static_cast<double>(budgetBytes) : 1.6e10;
   if (tableBytes > limit)
-    throw MemoryError(fmt::format(
-        "{}: grid '{}' spans {} x {} x {} voxels; its brick table alone needs {} of the {} that are "
-        "free. Remove stray voxels far from the smoke or raise render.memory_limit",
-        path, grid.getName(), nx * 8, ny * 8, nz * 8,
-        formatBytes(static_cast<std::uint64_t>(tableBytes)),
-        formatBytes(static_cast<std::uint64_t>(limit))));
+    throw MemoryError(
+        fmt::format("{}: grid '{}' spans {} x {} x {} voxels; its brick table alone needs {} of "
+                    "the {} that are "
+                    "free. Remove stray voxels far from the smoke or raise render.memory_limit",
+                    path, grid.getName(), nx * 8, ny * 8, nz * 8,
+                    formatBytes(static_cast<std::uint64_t>(tableBytes)),
+                    formatBytes(static_cast<std::uint64_t>(limit))));
 
   std::set<Vec3i, CoordLess> touched;
   for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf)
@@ -86,7 +89,8 @@ Field build(const GridT& grid, int c, const std::string& path, bool allowNegativ
   }
   std::vector<Vec3i> candidates;
   for (const Vec3i& b : touched)
-    if (b.x >= 0 && b.y >= 0 && b.z >= 0 && b.x < nx && b.y < ny && b.z < nz) candidates.push_back(b);
+    if (b.x >= 0 && b.y >= 0 && b.z >= 0 && b.x < nx && b.y < ny && b.z < nz)
+      candidates.push_back(b);
 
   auto fetch = [&](const Vec3i& b, float* nodes) {
     const auto accessor = grid.getConstUnsafeAccessor();
@@ -116,9 +120,10 @@ Field bricksFromGrid(const Grid& grid, int component, const std::string& path, b
     field = build(typed, component, path, allowNegative, budgetBytes);
   });
   if (!known)
-    throw InputError(path, fmt::format("grid '{}' is of type {}, which cannot be a coefficient; use a "
-                                       "float, half, double, int, bool or vec3 grid",
-                                       grid.name(), grid.valueType()));
+    throw InputError(path,
+                     fmt::format("grid '{}' is of type {}, which cannot be a coefficient; use a "
+                                 "float, half, double, int, bool or vec3 grid",
+                                 grid.name(), grid.valueType()));
   return field;
 }
 

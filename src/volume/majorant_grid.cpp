@@ -39,8 +39,7 @@ void forEachCell(const Field& field, const Visit& visit) {
 
 // Half extents, in local space, of a cube with this many node spacings along its edge.
 Vec3d halfExtents(const Mat4d& m, double edge) {
-  return 0.5 * edge *
-         (glm::abs(Vec3d(m[0])) + glm::abs(Vec3d(m[1])) + glm::abs(Vec3d(m[2])));
+  return 0.5 * edge * (glm::abs(Vec3d(m[0])) + glm::abs(Vec3d(m[1])) + glm::abs(Vec3d(m[2])));
 }
 
 double finestSpacing(const Mat4d& m) {
@@ -58,10 +57,9 @@ Box3d supportBounds(const MajorantSource& source) {
   Box3d box;
   if (nodes.empty()) return box;
   for (int corner = 0; corner < 8; ++corner)
-    box.grow(transformPoint(source.localFromNode,
-                            Vec3d(corner & 1 ? nodes.max.x : nodes.min.x,
-                                  corner & 2 ? nodes.max.y : nodes.min.y,
-                                  corner & 4 ? nodes.max.z : nodes.min.z)));
+    box.grow(transformPoint(source.localFromNode, Vec3d(corner & 1 ? nodes.max.x : nodes.min.x,
+                                                        corner & 2 ? nodes.max.y : nodes.min.y,
+                                                        corner & 4 ? nodes.max.z : nodes.min.z)));
   return box;
 }
 
@@ -76,8 +74,10 @@ MajorantGrid::MajorantGrid(std::span<const MajorantSource> sources, std::size_t 
   const Vec3d extent = m_bounds.extent();
   double cell = 4.0 * spacing;
   auto cellCount = [&](int a) { return std::max(1.0, std::ceil(extent[a] / cell * (1 - 1e-9))); };
-  while (cellCount(0) * cellCount(1) * cellCount(2) > static_cast<double>(maxCells)) cell *= 2;
-  for (int a = 0; a < 3; ++a) m_dims[a] = static_cast<int>(cellCount(a));
+  while (cellCount(0) * cellCount(1) * cellCount(2) > static_cast<double>(maxCells))
+    cell *= 2;
+  for (int a = 0; a < 3; ++a)
+    m_dims[a] = static_cast<int>(cellCount(a));
   m_origin = Vec3f(m_bounds.min);
   m_cellSize = Vec3f(static_cast<float>(cell));
   m_inverseCellSize = 1.0f / m_cellSize;
@@ -110,7 +110,8 @@ void MajorantGrid::splat(const MajorantSource& source) {
           bound = std::max(bound, extinction);
         }
   });
-  for (std::size_t i = 0; i < own.size(); ++i) m_values[i] += own[i];
+  for (std::size_t i = 0; i < own.size(); ++i)
+    m_values[i] += own[i];
 }
 
 }  // namespace photosphere::volume

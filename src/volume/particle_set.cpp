@@ -51,8 +51,8 @@ Box3d ParticleSet::bounds() const {
 }
 
 std::string houdiniName(std::string_view name) {
-  // Lower case, without underscores. Sources: channel names of Krakatoa PRT files, Maya nParticle
-  // caches, RealFlow, SPlisHSPlasH and Alembic, as FORMATS-type documents of each list them.
+  // Lower case, without underscores. The names are those found in Krakatoa PRT, Maya, RealFlow,
+  // SPlisHSPlasH, Mantaflow and Alembic files.
   static constexpr std::pair<std::string_view, std::string_view> names[] = {
       {"p", "P"},
       {"position", "P"},

@@ -4,8 +4,11 @@
 #include <openvdb/points/AttributeArrayString.h>
 #include <openvdb/points/PointDataGrid.h>
 
+#include <new>
+#include <stdexcept>
 #include <type_traits>
 
+#include "crash_guard.h"
 #include "openvdb_grid.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/log.h"
@@ -62,6 +65,11 @@ class PointReader {
     } catch (const openvdb::Exception& error) {
       throw InputError(m_name, fmt::format("is damaged: {}", error.what()));
     }
+    // OpenVDB asserts, which ends the process, where a name stands for a column that is not there.
+    const pts::AttributeSet& set = leaf.attributeSet();
+    for (const auto& [name, place] : set.descriptor().map())
+      if (place >= set.size())
+        throw InputError(m_name, fmt::format("is damaged: attribute \"{}\" has no values", name));
     return leaf.pointCount();
   }
 
@@ -186,7 +194,16 @@ class PointReader {
 ParticleSet gridToPoints(const Grid& grid) {
   if (!grid) throw InputError("point grid", "is missing");
   initializeOpenVdb();
-  return PointReader(grid).read();
+  const CrashGuard guard(describe(grid));  // what a damaged file holds may pass reading it
+  try {
+    return PointReader(grid).read();
+  } catch (const openvdb::Exception& error) {
+    throw InputError(describe(grid), std::string("is damaged: ") + error.what());
+  } catch (const std::bad_alloc&) {
+    throw InputError(describe(grid), "claims more points than there is memory for");
+  } catch (const std::length_error&) {
+    throw InputError(describe(grid), "claims more points than there is memory for");
+  }
 }
 
 }  // namespace photosphere::volume

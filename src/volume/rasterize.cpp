@@ -39,6 +39,7 @@ class Rasterizer {
   Rasterizer(const std::vector<Blob>& blobs, const Mat4d& worldFromIndex, double voxelSize)
       : m_budget(static_cast<double>(availableMemoryBytes()) * 0.8),
         m_inverseVolume(1.0 / (voxelSize * voxelSize * voxelSize)) {
+    checkLargest(blobs, voxelSize);
     makeSplats(blobs, Vec3d(worldFromIndex[3]), voxelSize);
     chooseTiles();
     makeVisits();
@@ -67,6 +68,22 @@ class Rasterizer {
   }
 
  private:
+  // The grid has no fewer voxels than its largest kernel; said before anyone walks over them.
+  void checkLargest(const std::vector<Blob>& blobs, double voxelSize) {
+    double largest = 0;
+    for (const Blob& blob : blobs)
+      largest = std::max(largest, blob.radius / voxelSize);
+    const double bytes = 4.0 / 3.0 * kPi * largest * largest * largest * sizeof(float);
+    if (bytes > m_budget) refuse(blobs.size());
+  }
+
+  [[noreturn]] void refuse(std::size_t particles) const {
+    throw MemoryError(
+        fmt::format("rasterizing {} particles needs more than the {} of memory that "
+                    "are free; give a larger voxel size",
+                    particles, formatBytes(static_cast<std::uint64_t>(m_budget / 0.8))));
+  }
+
   void makeSplats(const std::vector<Blob>& blobs, const Vec3d& origin, double voxelSize) {
     m_splats.resize(blobs.size());
     const double mostReach = 0x1p29;
@@ -172,11 +189,7 @@ class Rasterizer {
     double spent = m_spent.load();
     while (!m_spent.compare_exchange_weak(spent, spent + bytes)) {
     }
-    if (spent + bytes > m_budget)
-      throw MemoryError(
-          fmt::format("rasterizing {} particles needs more than the {} of memory that "
-                      "are free; give a larger voxel size",
-                      m_splats.size(), formatBytes(static_cast<std::uint64_t>(m_budget / 0.8))));
+    if (spent + bytes > m_budget) refuse(m_splats.size());
   }
 
   double m_budget;

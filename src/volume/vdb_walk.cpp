@@ -118,13 +118,20 @@ void walkMetadata(Cursor& in, const char* what) {
     in.fail(at, fmt::format("{} claims {} entries, {} bytes are left", what, count, in.left()));
   for (std::uint32_t i = 0; i < count; ++i) {
     in.text("a metadata name");
-    in.text("a metadata type");
+    const std::string type = in.text("a metadata type");
     const std::uint64_t sizeAt = in.position();
     const auto size = in.value<std::uint32_t>("a metadata size");
     if (size > in.left())
       in.fail(sizeAt,
               fmt::format("a metadata value of {} bytes, {} bytes are left", size, in.left()));
-    in.skip(size, "a metadata value");
+    const std::uint64_t valueAt = in.position();
+    // OpenVDB makes room for as many leaves as this one claims; a leaf takes 64 bytes and more.
+    if (type == "__delayedload" && size >= 4) {
+      const auto leaves = in.value<std::uint32_t>("a leaf count");
+      if (leaves > in.size() / 64)
+        in.fail(valueAt, fmt::format("{} leaves in a file of {} bytes", leaves, in.size()));
+    }
+    in.seek(valueAt + size);
   }
 }
 

@@ -20,7 +20,9 @@ struct Specimen {
   std::string name, file, bytes;
 };
 
-void PrintTo(const Specimen& specimen, std::ostream* out) { *out << specimen.name; }
+void PrintTo(const Specimen& specimen, std::ostream* out) {
+  *out << specimen.name;
+}
 
 std::string gzip(const std::string& text) {
   z_stream stream{};

@@ -21,7 +21,8 @@ std::vector<Vec3i> allBricks(const Vec3i& bricks) {
   std::vector<Vec3i> all;
   for (int z = 0; z < bricks.z; ++z)
     for (int y = 0; y < bricks.y; ++y)
-      for (int x = 0; x < bricks.x; ++x) all.push_back({x, y, z});
+      for (int x = 0; x < bricks.x; ++x)
+        all.push_back({x, y, z});
   return all;
 }
 
@@ -114,7 +115,8 @@ std::unique_ptr<lights::Light> makeLight(
     const std::string& type, const std::vector<std::pair<std::string, std::string>>& options) {
   const lights::LightPlugin& plugin = findPlugin(lights::lightModels(), type, "light", "test");
   ParamValues values(plugin.params);
-  for (const auto& [name, text] : options) values.setText(name, text, "test");
+  for (const auto& [name, text] : options)
+    values.setText(name, text, "test");
   return plugin.create(values, lights::LocalSpace{});
 }
 

@@ -15,15 +15,16 @@ struct MediumOptions {
 };
 
 /// A box of constant density 1 with sharp faces: `cells` multiples of 8, centred on the origin.
-transport::MediumVolume boxVolume(const Vec3d& size, const Vec3i& cells, const MediumOptions& options);
+transport::MediumVolume boxVolume(const Vec3d& size, const Vec3i& cells,
+                                  const MediumOptions& options);
 
-/// A density sampled at the nodes of a lattice of `cells` (a multiple of 8 a side) over a cube of the
-/// given edge, centred on the origin.
+/// A density sampled at the nodes of a lattice of `cells` (a multiple of 8 a side) over a cube of
+/// the given edge, centred on the origin.
 transport::MediumVolume sampledVolume(double edge, int cells, const MediumOptions& options,
                                       const std::function<double(const Vec3d&)>& density);
 
-/// Density of a fractal plume in a unit cube about the origin: a rising, widening column eaten away by
-/// value noise. Largest value about 1.
+/// Density of a fractal plume in a unit cube about the origin: a rising, widening column eaten away
+/// by value noise. Largest value about 1.
 double plumeDensity(const Vec3d& p);
 
 transport::Medium makeMedium(transport::MediumVolume volume);

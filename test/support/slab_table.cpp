@@ -19,7 +19,8 @@ const std::vector<SlabRow>& slabTable() {
     while (std::getline(in, line)) {
       std::stringstream fields(line);
       std::string f[7];
-      for (std::string& field : f) std::getline(fields, field, ',');
+      for (std::string& field : f)
+        std::getline(fields, field, ',');
       read.push_back({f[0], std::stod(f[1]), std::stod(f[2]), std::stod(f[3]), f[4],
                       f[5].empty() ? 0.0 : std::stod(f[5]), std::stod(f[6])});
     }

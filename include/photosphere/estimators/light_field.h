@@ -1,6 +1,6 @@
 #pragma once
-// The light field: what photons leave on carriers, before any view is known. This is what a light cache
-// holds.
+// The light field: what photons leave on carriers, before any view is known. This is what a light
+// cache holds.
 
 #include <cstdint>
 #include <string>
@@ -28,12 +28,13 @@ struct LightFieldLayout {
   Deposit deposit = Deposit::trackLength;
   EnergyRule energy = EnergyRule::gather;
   SpatialKernel kernel = SpatialKernel::epanechnikov;
-  int rows = 2;              ///< 8 rows^2 direction bins (histogram)
-  int channels = 3;          ///< 1 where lights and media are grey
-  int phases = 1;            ///< distinct phase functions (view)
-  bool unscattered = false;  ///< a second set holds the light of lamps with extent before its first event
-  double lightVoxel = 2.0;   ///< light voxel edge over density voxel edge
-  double radius = 0.0;       ///< support of the spatial kernel [m]
+  int rows = 2;      ///< 8 rows^2 direction bins (histogram)
+  int channels = 3;  ///< 1 where lights and media are grey
+  int phases = 1;    ///< distinct phase functions (view)
+  bool unscattered =
+      false;  ///< a second set holds the light of lamps with extent before its first event
+  double lightVoxel = 2.0;     ///< light voxel edge over density voxel edge
+  double radius = 0.0;         ///< support of the spatial kernel [m]
   double depositRadius = 0.0;  ///< [m]; particles with collision deposit
 
   int bins() const { return basis == Basis::histogram ? 8 * rows * rows : phases; }
@@ -44,15 +45,16 @@ struct LightFieldLayout {
   bool holdsPower() const { return carrier == Carrier::particles && deposit == Deposit::collision; }
 };
 
-/// Values on carriers, [carrier][set][bin][channel]. Histogram: fluence rate that arrives in the bin
-/// [W m^-2], or power [W] (holdsPower). View: the same times the phase function toward the eye [1/sr].
+/// Values on carriers, [carrier][set][bin][channel]. Histogram: fluence rate that arrives in the
+/// bin [W m^-2], or power [W] (holdsPower). View: the same times the phase function toward the eye
+/// [1/sr].
 struct LightField {
   LightFieldLayout layout;
-  transport::SupportLattice lattice;   ///< light voxels; the carriers themselves for Carrier::voxels
-  std::vector<Vec3f> particles;        ///< positions, local space [m]; Carrier::particles
+  transport::SupportLattice lattice;  ///< light voxels; the carriers themselves for Carrier::voxels
+  std::vector<Vec3f> particles;       ///< positions, local space [m]; Carrier::particles
   std::vector<float> values;
-  std::uint64_t photons = 0;           ///< emitted in all
-  std::uint64_t farPhotons = 0;        ///< collisions without a particle in range, given to the nearest
+  std::uint64_t photons = 0;     ///< emitted in all
+  std::uint64_t farPhotons = 0;  ///< collisions without a particle in range, given to the nearest
 
   std::size_t carriers() const {
     return layout.carrier == Carrier::voxels ? lattice.size() : particles.size();
@@ -65,7 +67,8 @@ struct LightField {
 /// Traces photons and gathers them on carriers.
 /// @param view       used by Basis::view alone
 /// @param particles  positions, local space; used by Carrier::particles alone
-/// @throws ConfigError for combinations that METHOD.md section 4 does not allow or without particles;
+/// @throws ConfigError for combinations that METHOD.md section 4 does not allow or without
+/// particles;
 ///         MemoryError
 LightField traceLightField(const transport::Medium& medium, const transport::LightList& lights,
                            const LightFieldLayout& layout, const View& view,

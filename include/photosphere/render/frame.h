@@ -20,12 +20,12 @@ struct Crop {
 };
 
 struct FrameOptions {
-  int samples = 4;                 ///< camera samples a pixel
+  int samples = 4;  ///< camera samples a pixel
   FilterKind filter = FilterKind::blackmanHarris;
-  double filterWidth = 0.0;        ///< full width [pixels]; 0 = the filter's own
+  double filterWidth = 0.0;  ///< full width [pixels]; 0 = the filter's own
   Crop crop;
   RandomKey key;
-  lights::LocalSpace space;        ///< camera rays are in world space
+  lights::LocalSpace space;  ///< camera rays are in world space
 };
 
 /// Layers of a frame over its crop, row by row from the top, RGB interleaved as Rgb.
@@ -33,11 +33,11 @@ struct FrameLayers {
   Crop crop;
   Vec2i resolution{0};
   std::vector<Rgb> beauty, single, multiple, emission, background, transmittance;
-  std::vector<float> alpha;   ///< 1 - mean transmittance
-  std::vector<float> depth;   ///< opacity-weighted distance along the camera's axis [scene units]; kNoDepth
-                              ///< where nothing was met
+  std::vector<float> alpha;  ///< 1 - mean transmittance
+  std::vector<float> depth;  ///< opacity-weighted distance along the camera's axis [scene units];
+                             ///< kNoDepth where nothing was met
   std::uint64_t nanSamples = 0, negativeSamples = 0;
-  Vec2i firstBad{-1};         ///< pixel of the first NaN or negative sample
+  Vec2i firstBad{-1};  ///< pixel of the first NaN or negative sample
   IntegratorCounters counters;
   int width() const { return crop.max.x - crop.min.x; }
   int height() const { return crop.max.y - crop.min.y; }
@@ -46,12 +46,24 @@ struct FrameLayers {
 /// `Z` of a pixel without smoke: far and finite.
 inline constexpr float kNoDepth = 1e10f;
 
-/// Renders the crop. Each pixel's samples are drawn from its filter, so pixels do not depend on tiles,
-/// crop or threads. @throws InterruptedError
+/// Renders the crop. A sample counts in every pixel whose filter reaches it, so that few samples a
+/// pixel integrate smooth smoke closely; samples beyond the crop's and the frame's border are
+/// traced too, so pixels depend neither on the crop nor on threads. @throws InterruptedError
 FrameLayers renderFrame(const cameras::Camera& camera, const Integrator& integrator,
                         const FrameOptions& options);
 
-/// Offset from the pixel centre, drawn from the filter's density. @return [pixels]
-Vec2d sampleFilter(FilterKind filter, double width, const Vec2d& u);
+/// Pixel filter as a function of the offset from the pixel centre, not normalised.
+class PixelFilter {
+ public:
+  /// @param width  full width [pixels]; 0 = box 1, triangle 2, Blackman-Harris 3
+  PixelFilter(FilterKind kind, double width);
+  double radius() const { return m_radius; }
+  float weight(const Vec2d& offset) const { return profile(offset.x) * profile(offset.y); }
+
+ private:
+  float profile(double x) const;
+  FilterKind m_kind;
+  double m_radius;
+};
 
 }  // namespace photosphere::render

@@ -17,13 +17,13 @@ namespace photosphere::render {
 
 /// Radiance of one camera ray, layer by layer [W m^-2 sr^-1].
 struct RayRadiance {
-  Rgb single{0.0f};         ///< light of lamps scattered once
-  Rgb multiple{0.0f};       ///< light scattered twice or more
+  Rgb single{0.0f};    ///< light of lamps scattered once
+  Rgb multiple{0.0f};  ///< light scattered twice or more
   Rgb emission{0.0f};
-  Rgb background{0.0f};     ///< surroundings seen through the smoke
+  Rgb background{0.0f};  ///< surroundings seen through the smoke
   Rgb transmittance{1.0f};
-  float depth = 0.0f;       ///< sum of opacity times distance [m]; divide by the opacity
-  float opacity = 0.0f;     ///< what `depth` was weighted with
+  float depth = 0.0f;    ///< sum of opacity times distance [m]; divide by the opacity
+  float opacity = 0.0f;  ///< what `depth` was weighted with
 
   Rgb total() const { return single + multiple + emission + background; }
 };
@@ -31,9 +31,9 @@ struct RayRadiance {
 /// Counts that a frame reports. Merged over threads.
 struct IntegratorCounters {
   transport::TrackingCounters tracking;
-  std::uint64_t scatterings = 0;     ///< real collisions of path tracing
-  std::uint64_t capped = 0;          ///< paths ended by max_scatter
-  double cappedRadiance = 0.0;       ///< throughput they still carried, summed
+  std::uint64_t scatterings = 0;  ///< real collisions of path tracing
+  std::uint64_t capped = 0;       ///< paths ended by max_scatter
+  double cappedRadiance = 0.0;    ///< throughput they still carried, summed
 };
 
 class Integrator {
@@ -57,8 +57,8 @@ struct PathOptions {
   Effects effects;
 };
 
-/// Unbiased path tracing: delta tracking, next-event estimation with ratio-tracked shadows, no bounce
-/// cap unless asked.
+/// Unbiased path tracing: delta tracking, next-event estimation with ratio-tracked shadows, no
+/// bounce cap unless asked.
 std::unique_ptr<Integrator> makePathIntegrator(const transport::Medium& medium,
                                                const transport::LightList& lights,
                                                const PathOptions& options);

@@ -33,7 +33,6 @@ class Shadows {
   std::uint64_t memoryBytes() const;
 
  private:
-
   struct Table {
     volume::BrickField<float> opticalDepth;
     Vec3f origin{0.0f};

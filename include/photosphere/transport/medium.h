@@ -30,11 +30,12 @@ struct MediumVolume {
 
 /// Coefficients at a point.
 struct Coefficients {
-  float extinction = 0.0f;                     ///< sigma_t [1/m]
-  std::array<Rgb, kMaxPhases> scattering{};    ///< sigma_s of each distinct phase function [1/m]
+  float extinction = 0.0f;                   ///< sigma_t [1/m]
+  std::array<Rgb, kMaxPhases> scattering{};  ///< sigma_s of each distinct phase function [1/m]
   Rgb totalScattering(int phases) const {
     Rgb sum(0.0f);
-    for (int i = 0; i < phases; ++i) sum += scattering[static_cast<std::size_t>(i)];
+    for (int i = 0; i < phases; ++i)
+      sum += scattering[static_cast<std::size_t>(i)];
     return sum;
   }
 };
@@ -48,14 +49,17 @@ class Medium {
   /// sigma_t [1/m].
   float extinction(const Vec3f& p) const {
     float sum = 0.0f;
-    for (const Placed& v : m_placed) sum += v.scale * v.field->sample(v.nodeFromLocal(p));
+    for (const Placed& v : m_placed)
+      sum += v.scale * v.field->sample(v.nodeFromLocal(p));
     return sum;
   }
   /// All coefficients at a point.
   void coefficients(const Vec3f& p, Coefficients& out) const;
 
   /// The albedo, where one number (or colour) holds everywhere; nullptr where it varies.
-  const Rgb* uniformAlbedo() const { return m_uniformAlbedo ? &m_albedo.front().constant : nullptr; }
+  const Rgb* uniformAlbedo() const {
+    return m_uniformAlbedo ? &m_albedo.front().constant : nullptr;
+  }
   /// Distinct phase functions, in order of first use.
   const std::vector<phase::HenyeyGreenstein>& phases() const { return m_phases; }
   const volume::MajorantGrid& majorants() const { return m_majorants; }

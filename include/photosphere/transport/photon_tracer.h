@@ -1,6 +1,7 @@
 #pragma once
-// Photon tracing into a sink (Min & Ihm 2010, section 4.1, figure 3): lamps emit photons of equal power,
-// each flies, collides, is absorbed or scattered by Russian roulette, one direction per event.
+// Photon tracing into a sink (Min & Ihm 2010, section 4.1, figure 3): lamps emit photons of equal
+// power, each flies, collides, is absorbed or scattered by Russian roulette, one direction per
+// event.
 
 #include <cstdint>
 #include <memory>
@@ -38,18 +39,18 @@ class FlightSink {
 };
 
 struct TraceOptions {
-  std::uint64_t photons = 1'000'000;   ///< of the whole frame, over all lights
-  std::uint64_t firstPhoton = 0;       ///< of this shard
-  std::uint64_t photonCount = ~0ull;   ///< of this shard; clipped to the frame's
+  std::uint64_t photons = 1'000'000;  ///< of the whole frame, over all lights
+  std::uint64_t firstPhoton = 0;      ///< of this shard
+  std::uint64_t photonCount = ~0ull;  ///< of this shard; clipped to the frame's
   RandomKey key;
 };
 
 /// What became of the photons. Powers are per channel [W] of the whole frame's lamps.
 struct TraceStatistics {
-  std::uint64_t photons = 0;      ///< emitted in this run
+  std::uint64_t photons = 0;  ///< emitted in this run
   std::uint64_t scatterings = 0;
   std::uint64_t flights = 0;
-  std::uint64_t capped = 0;       ///< photons ended by the roulette after kLongPath events
+  std::uint64_t capped = 0;  ///< photons ended by the roulette after kLongPath events
   std::uint64_t majorantViolations = 0;
   Vec3d emitted{0.0}, missed{0.0}, absorbed{0.0}, escaped{0.0}, cappedPower{0.0};
   /// emitted - missed - absorbed - escaped - capped: zero up to rounding.

@@ -9,13 +9,13 @@ namespace photosphere::transport {
 /// Result of a collision.
 struct ScatterEvent {
   bool survived = false;
-  Rgb weight{1.0f};      ///< multiplies the power; no channel above 1 for one phase function
+  Rgb weight{1.0f};  ///< multiplies the power; no channel above 1 for one phase function
   Vec3f direction{0.0f};
-  int phase = 0;         ///< index into Medium::phases()
+  int phase = 0;  ///< index into Medium::phases()
 };
 
-/// Russian roulette with the largest albedo of the channels, so that grey media keep equal weights and
-/// coloured ones bounded weights; then a phase function in proportion to its scattering.
+/// Russian roulette with the largest albedo of the channels, so that grey media keep equal weights
+/// and coloured ones bounded weights; then a phase function in proportion to its scattering.
 inline ScatterEvent scatter(const Medium& medium, const Vec3f& point, const Vec3f& wi, Rng& rng) {
   ScatterEvent event;
   const auto& phases = medium.phases();
@@ -28,7 +28,8 @@ inline ScatterEvent scatter(const Medium& medium, const Vec3f& point, const Vec3
     medium.coefficients(point, c);
     const int count = static_cast<int>(phases.size());
     const Rgb scattering = c.totalScattering(count);
-    const float q = c.extinction > 0.0f ? glm::min(1.0f, maxComponent(scattering) / c.extinction) : 0.0f;
+    const float q =
+        c.extinction > 0.0f ? glm::min(1.0f, maxComponent(scattering) / c.extinction) : 0.0f;
     if (!(rng.uniform() < q)) return event;
     event.weight = scattering / maxComponent(scattering);
     if (count > 1) {

@@ -1,6 +1,6 @@
 #pragma once
-// A sparse axis-aligned lattice of cubic voxels over the smoke and a margin around it: where light is
-// stored and shadows are tabulated.
+// A sparse axis-aligned lattice of cubic voxels over the smoke and a margin around it: where light
+// is stored and shadows are tabulated.
 
 #include <array>
 #include <cstdint>
@@ -10,8 +10,9 @@
 
 namespace photosphere::transport {
 
-/// Active voxels are those that the medium's extinction can reach, dilated by a margin. They are kept
-/// in bricks of 8^3 and numbered consecutively, brick by brick, x fastest inside a brick. Local space.
+/// Active voxels are those that the medium's extinction can reach, dilated by a margin. They are
+/// kept in bricks of 8^3 and numbered consecutively, brick by brick, x fastest inside a brick.
+/// Local space.
 class SupportLattice {
  public:
   SupportLattice() = default;
@@ -19,7 +20,8 @@ class SupportLattice {
   /// @param margin   dilation in voxels, >= 0, along each axis
   /// @throws MemoryError when the brick table alone would pass 4 GiB
   SupportLattice(const Medium& medium, double edge, int margin);
-  /// Rebuilds a lattice from its placement and the coordinates of its active voxels, in their order.
+  /// Rebuilds a lattice from its placement and the coordinates of its active voxels, in their
+  /// order.
   SupportLattice(const Vec3d& origin, double edge, const Vec3i& bricks,
                  const std::vector<Vec3i>& active);
 
@@ -36,7 +38,8 @@ class SupportLattice {
   /// Number of a voxel, or -1 where it is inactive or outside.
   std::int32_t number(const Vec3i& v) const {
     const Vec3i b(v.x >> 3, v.y >> 3, v.z >> 3);
-    if (b.x < 0 || b.y < 0 || b.z < 0 || b.x >= m_bricks.x || b.y >= m_bricks.y || b.z >= m_bricks.z)
+    if (b.x < 0 || b.y < 0 || b.z < 0 || b.x >= m_bricks.x || b.y >= m_bricks.y ||
+        b.z >= m_bricks.z)
       return -1;
     const std::int32_t brick = m_table[tableIndex(b)];
     if (brick < 0) return -1;
@@ -47,8 +50,8 @@ class SupportLattice {
   const std::vector<Vec3i>& activeBricks() const { return m_activeBricks; }
   std::uint64_t memoryBytes() const;
 
-  /// Calls visit(number, distance to entry, length) for every active voxel that a flight crosses, in
-  /// order (exact clipping, Amanatides & Woo 1987). `from` in local space, `d` unit, length [m].
+  /// Calls visit(number, distance to entry, length) for every active voxel that a flight crosses,
+  /// in order (exact clipping, Amanatides & Woo 1987). `from` in local space, `d` unit, length [m].
   template <class Visit>
   void walk(const Vec3f& from, const Vec3f& d, float length, const Visit& visit) const;
 
@@ -66,14 +69,15 @@ class SupportLattice {
   float m_inverseEdge = 1.0f;
   Vec3f m_originF{0.0f};
   Vec3i m_bricks{0};
-  std::vector<std::int32_t> m_table;     // brick number by brick coordinates
-  std::vector<std::int32_t> m_numbers;   // 512 voxel numbers a brick
+  std::vector<std::int32_t> m_table;    // brick number by brick coordinates
+  std::vector<std::int32_t> m_numbers;  // 512 voxel numbers a brick
   std::vector<Vec3i> m_activeBricks;
   std::vector<Vec3i> m_voxels;
 };
 
 template <class Visit>
-void SupportLattice::walk(const Vec3f& from, const Vec3f& d, float length, const Visit& visit) const {
+void SupportLattice::walk(const Vec3f& from, const Vec3f& d, float length,
+                          const Visit& visit) const {
   // Everything in voxel units: u(t) = start + d t, t in voxels.
   const Vec3f start = (from - m_originF) * m_inverseEdge;
   const float edge = static_cast<float>(m_edge);
@@ -87,7 +91,8 @@ void SupportLattice::walk(const Vec3f& from, const Vec3f& d, float length, const
     const float inverse = 1.0f / d[a];
     delta[a] = d[a] != 0 ? std::abs(inverse) : kInfinity;
     next[a] = d[a] != 0
-                  ? glm::max(0.0f, (static_cast<float>(cell[a] + (d[a] > 0 ? 1 : 0)) - start[a]) * inverse)
+                  ? glm::max(0.0f, (static_cast<float>(cell[a] + (d[a] > 0 ? 1 : 0)) - start[a]) *
+                                       inverse)
                   : kInfinity;
   }
   float t = 0.0f;

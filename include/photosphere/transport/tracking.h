@@ -22,7 +22,8 @@ struct Segment {
 Segment clipToMedium(const Medium& medium, const Vec3d& origin, const Vec3f& direction,
                      double maxDistance);
 
-/// How often the extinction exceeded its majorant. Counted, reported, never clamped away in silence.
+/// How often the extinction exceeded its majorant. Counted, reported, never clamped away in
+/// silence.
 struct TrackingCounters {
   std::uint64_t majorantViolations = 0;
   std::uint64_t lookups = 0;
@@ -37,7 +38,7 @@ struct Collision {
 
 /// The first real collision (Woodcock delta tracking over local majorants).
 inline Collision sampleCollision(const Medium& medium, const Vec3f& o, const Vec3f& d, float length,
-                             Rng& rng, TrackingCounters& counters) {
+                                 Rng& rng, TrackingCounters& counters) {
   volume::MajorantGrid::Walk walk(medium.majorants(), o, d, 0.0f, length);
   float tau = -fastLog(rng.uniformPositive());
   while (!walk.done()) {

@@ -1,6 +1,6 @@
 #pragma once
-// The render-time sampler: a sparse lattice of values in bricks that carry their own apron, so that a
-// trilinear lookup reads one brick and never asks a tree.
+// The render-time sampler: a sparse lattice of values in bricks that carry their own apron, so that
+// a trilinear lookup reads one brick and never asks a tree.
 
 #include <algorithm>
 #include <cmath>
@@ -15,14 +15,14 @@
 
 namespace photosphere::volume {
 
-/// Sparse lattice of values of type T (float or Vec4f). Node (0,0,0) lies at index `origin()` of the
-/// lattice's own index space; positions passed to `sample` count nodes from there. Nodes outside every
-/// brick are zero. Immutable after construction; reading is thread-safe.
+/// Sparse lattice of values of type T (float or Vec4f). Node (0,0,0) lies at index `origin()` of
+/// the lattice's own index space; positions passed to `sample` count nodes from there. Nodes
+/// outside every brick are zero. Immutable after construction; reading is thread-safe.
 template <class T>
 class BrickField {
  public:
-  static constexpr int kEdge = 8;               ///< voxel cells per brick edge
-  static constexpr int kNodes = kEdge + 1;      ///< nodes per brick edge, apron included
+  static constexpr int kEdge = 8;           ///< voxel cells per brick edge
+  static constexpr int kNodes = kEdge + 1;  ///< nodes per brick edge, apron included
   static constexpr int kBrickSize = kNodes * kNodes * kNodes;
 
   BrickField() = default;
@@ -68,7 +68,9 @@ class BrickField {
   const T* nodes(std::int32_t brick) const {
     return m_nodes.data() + static_cast<std::size_t>(brick) * kBrickSize;
   }
-  bool isConstant(std::int32_t brick) const { return m_constant[static_cast<std::size_t>(brick)] != 0; }
+  bool isConstant(std::int32_t brick) const {
+    return m_constant[static_cast<std::size_t>(brick)] != 0;
+  }
   std::uint64_t memoryBytes() const {
     return m_table.size() * sizeof(std::int32_t) + m_nodes.size() * sizeof(T) + m_constant.size();
   }
@@ -94,9 +96,10 @@ extern template class BrickField<Vec4f>;
 
 /// A scalar grid, or one component of a vector grid, as bricks. Inactive voxels count as zero.
 /// @param component  0 to 2 for a vector grid, 0 for a scalar grid
-/// @throws InputError when the grid is neither, or holds a NaN, infinite or (unless allowed) negative
-///         value: it names the grid and the first such voxel; MemoryError when the table alone would
-///         pass `budgetBytes` (0 = no budget)
+/// @throws InputError when the grid is neither, or holds a NaN, infinite or (unless allowed)
+/// negative
+///         value: it names the grid and the first such voxel; MemoryError when the table alone
+///         would pass `budgetBytes` (0 = no budget)
 BrickField<float> bricksFromGrid(const Grid& grid, int component, const std::string& path,
                                  bool allowNegative, std::uint64_t budgetBytes);
 

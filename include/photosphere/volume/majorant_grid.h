@@ -48,8 +48,8 @@ class MajorantGrid {
         const float inverse = 1.0f / d[a];
         m_step[a] = d[a] > 0 ? 1 : -1;
         m_delta[a] = d[a] != 0 ? std::abs(grid.m_cellSize[a] * inverse) : kInfinity;
-        const float plane = grid.m_origin[a] +
-                            static_cast<float>(cell + (d[a] > 0 ? 1 : 0)) * grid.m_cellSize[a];
+        const float plane =
+            grid.m_origin[a] + static_cast<float>(cell + (d[a] > 0 ? 1 : 0)) * grid.m_cellSize[a];
         m_next[a] = d[a] != 0 ? std::max(t0, (plane - o[a]) * inverse) : kInfinity;
       }
       m_index = grid.cellIndex(m_cell);
@@ -58,11 +58,10 @@ class MajorantGrid {
     float majorant() const { return m_grid->m_values[m_index]; }
     float begin() const { return m_t; }
     /// End of the current cell along the ray.
-    float end() const {
-      return std::min(m_end, std::min(m_next.x, std::min(m_next.y, m_next.z)));
-    }
+    float end() const { return std::min(m_end, std::min(m_next.x, std::min(m_next.y, m_next.z))); }
     void advance() {
-      const int a = m_next.x < m_next.y ? (m_next.x < m_next.z ? 0 : 2) : (m_next.y < m_next.z ? 1 : 2);
+      const int a =
+          m_next.x < m_next.y ? (m_next.x < m_next.z ? 0 : 2) : (m_next.y < m_next.z ? 1 : 2);
       m_t = m_next[a];
       m_cell[a] += m_step[a];
       if (m_cell[a] < 0 || m_cell[a] >= m_grid->m_dims[a]) {

@@ -35,11 +35,15 @@ CacheContent read(const std::filesystem::path& path, const ParamValues& options)
   return content;
 }
 
-/// Whole numbers keep a `.0`, so that a reader sees that the column is real.
+/// Whole numbers keep a `.0`, so that a reader sees that the column is real. Large ones have an
+/// exponent: written out, a float would show more than the nine digits that mark a column as float.
 template <class T>
 void appendReal(std::string& text, T value) {
   const std::size_t begin = text.size();
-  appendNumber(text, value);
+  char buffer[40];
+  const auto result =
+      std::to_chars(buffer, buffer + sizeof buffer, value, std::chars_format::general);
+  text.append(buffer, result.ptr);
   if (text.find_first_not_of("-0123456789", begin) == text.npos) text += ".0";
 }
 
@@ -68,7 +72,7 @@ void appendValue(std::string& text, const volume::Attribute& attribute, std::siz
 }
 
 /// `x,y,z,vx,..`; names may not hold what separates them.
-std::string headerLine(const volume::ParticleSet& particles, char delimiter,
+std::string headerLine(const WritableParticles& particles, char delimiter,
                        const std::string& path) {
   std::string header;
   std::set<std::string> taken;
@@ -85,23 +89,23 @@ std::string headerLine(const volume::ParticleSet& particles, char delimiter,
     }
   };
   add("P", 3);
-  for (const volume::Attribute& attribute : particles.attributes)
-    add(attribute.name, attribute.arity);
+  for (const volume::Attribute* attribute : particles.attributes)
+    add(attribute->name, attribute->arity);
   return header + "\n";
 }
 
-void writeRows(ByteWriter& file, const volume::ParticleSet& particles, char delimiter) {
+void writeRows(ByteWriter& file, const WritableParticles& particles, char delimiter) {
   std::string text;
-  for (std::size_t i = 0; i < particles.size(); ++i) {
+  for (std::size_t i = 0; i < particles.set.size(); ++i) {
     for (int c = 0; c < 3; ++c) {
       if (c > 0) text += delimiter;
-      appendNumber(text, particles.positions[i][c]);
+      appendNumber(text, particles.set.positions[i][c]);
     }
-    for (const volume::Attribute& attribute : particles.attributes) {
-      const std::size_t arity = static_cast<std::size_t>(attribute.arity);
+    for (const volume::Attribute* attribute : particles.attributes) {
+      const std::size_t arity = static_cast<std::size_t>(attribute->arity);
       for (std::size_t c = 0; c < arity; ++c) {
         text += delimiter;
-        appendValue(text, attribute, i * arity + c);
+        appendValue(text, *attribute, i * arity + c);
       }
     }
     text += '\n';
@@ -145,10 +149,10 @@ void writePts(ByteWriter& file, const volume::ParticleSet& particles, const std:
 }
 
 void write(const std::filesystem::path& path, const CacheContent& content, const ParamValues&) {
-  const volume::ParticleSet particles = onlyParticles(path, content, "CSV", true);
+  const WritableParticles particles = onlyParticles(path, content, "CSV", true);
   if (isPts(path)) {
     ByteWriter file(path);
-    writePts(file, particles, path.string());
+    writePts(file, particles.set, path.string());
     return file.commit();
   }
   const bool comma = lowered(path.extension().string()) == ".csv";

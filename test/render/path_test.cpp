@@ -1,0 +1,139 @@
+// Path tracing, the truth, against closed forms and the slab reference.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "photosphere/core/parallel.h"
+#include "photosphere/render/integrator.h"
+#include "support/media.h"
+#include "support/slab_table.h"
+
+namespace photosphere::test {
+
+namespace {
+
+using render::EnvironmentSampling;
+using render::IntegratorCounters;
+using render::RayRadiance;
+
+struct Estimate {
+  double mean = 0, error = 0;  // standard error of the mean
+};
+
+// Mean of a layer over many independent paths of one ray.
+template <class Pick>
+Estimate estimate(const render::Integrator& integrator, const Vec3d& origin, const Vec3f& direction,
+                  std::size_t count, const Pick& pick) {
+  constexpr std::size_t kChunk = 4096;
+  const std::size_t chunks = (count + kChunk - 1) / kChunk;
+  std::vector<double> sums(chunks), squares(chunks);
+  parallelFor(chunks, 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t chunk = begin; chunk < end; ++chunk) {
+      IntegratorCounters counters;
+      for (std::size_t i = 0; i < kChunk; ++i) {
+        Rng rng(RandomKey::fromSeed(11, 0), RandomStream::camera, chunk * kChunk + i);
+        const double v = pick(integrator.radiance(origin, direction, rng, counters));
+        sums[chunk] += v;
+        squares[chunk] += v * v;
+      }
+    }
+  });
+  double sum = 0, square = 0;
+  for (std::size_t i = 0; i < chunks; ++i) {
+    sum += sums[i];
+    square += squares[i];
+  }
+  const double n = static_cast<double>(chunks * kChunk);
+  const double mean = sum / n;
+  return {mean, std::sqrt(std::max(0.0, square / n - mean * mean) / n)};
+}
+
+double total(const RayRadiance& r) {
+  return static_cast<double>(r.total().y);
+}
+
+TEST(PathTracing, FurnaceByEscapeIsOneToRounding) {
+  const transport::Medium medium =
+      makeMedium(sampledVolume(1.0, 32, {1.0, 0.6, 12.0}, plumeDensity));
+  transport::LightList lights;
+  lights.push_back(makeLight("environment", {}));
+  const auto path =
+      render::makePathIntegrator(medium, lights, {0, EnvironmentSampling::escape, {}});
+  for (const Vec3f d : {Vec3f(1, 0, 0), glm::normalize(Vec3f(0.2f, 0.9f, 0.1f)), Vec3f(0, 0, 1)}) {
+    const Estimate e = estimate(*path, Vec3d(d) * -2.0, d, 20000, total);
+    EXPECT_NEAR(e.mean, 1.0, 1e-5);
+    EXPECT_LT(e.error, 1e-6);
+  }
+}
+
+TEST(PathTracing, FurnaceByNextEventIsOneWithinFourStandardErrors) {
+  const transport::Medium medium =
+      makeMedium(sampledVolume(1.0, 32, {1.0, 0.6, 12.0}, plumeDensity));
+  transport::LightList lights;
+  lights.push_back(makeLight("environment", {}));
+  const auto path =
+      render::makePathIntegrator(medium, lights, {0, EnvironmentSampling::nextEvent, {}});
+  for (const Vec3f d : {Vec3f(1, 0, 0), glm::normalize(Vec3f(0.2f, 0.9f, 0.1f))}) {
+    const Estimate e = estimate(*path, Vec3d(d) * -2.0, d, 100000, total);
+    EXPECT_NEAR(e.mean, 1.0, 4 * e.error);
+    EXPECT_GT(e.error, 0.0);
+    EXPECT_LT(e.error, 0.02);
+  }
+}
+
+TEST(PathTracing, TransmittanceFollowsBeerAndLambert) {
+  const transport::Medium medium = makeMedium(boxVolume(Vec3d(2.0), Vec3i(16), {0.0, 0.0, 1.5}));
+  const transport::LightList lights;
+  const auto path = render::makePathIntegrator(medium, lights, {});
+  // Straight through, and at 45 degrees through an edge.
+  const Estimate straight =
+      estimate(*path, {-5, 0.1, 0.2}, {1, 0, 0}, 100000,
+               [](const RayRadiance& r) { return static_cast<double>(r.transmittance.x); });
+  EXPECT_NEAR(straight.mean, std::exp(-3.0), 4 * straight.error + 1e-6);
+  const Vec3f d = glm::normalize(Vec3f(1, 1, 0));
+  const Estimate oblique =
+      estimate(*path, Vec3d(0.5, -0.5, 0) - Vec3d(d) * 5.0, d, 100000,
+               [](const RayRadiance& r) { return static_cast<double>(r.transmittance.x); });
+  EXPECT_NEAR(oblique.mean, std::exp(-1.5 * std::sqrt(2.0)), 4 * oblique.error + 1e-6);
+}
+
+struct RadianceCase {
+  double tau, albedo, g;
+};
+
+class SlabRadiance : public testing::TestWithParam<RadianceCase> {};
+
+TEST_P(SlabRadiance, MatchesTheReferenceWithinFourStandardErrors) {
+  const RadianceCase& c = GetParam();
+  const transport::Medium medium = slabMedium(c.tau, c.albedo, c.g);
+  transport::LightList lights;
+  lights.push_back(makeLight("directional", {{"position", "[0, 0, 1]"}, {"target", "[0, 0, 0]"}}));
+  const auto path = render::makePathIntegrator(medium, lights, {});
+  int checked = 0;
+  for (const SlabRow& row : slabTable()) {
+    if (row.illumination != "beam" || row.tau != c.tau || row.albedo != c.albedo || row.g != c.g)
+      continue;
+    const bool top = row.quantity == "L_top";
+    if (!top && row.quantity != "L_bottom") continue;
+    if (row.at != 0.2 && row.at != 0.5 && row.at != 0.8 && row.at != 1.0) continue;
+    const auto mu = static_cast<float>(row.at);
+    const float s = std::sqrt(1 - mu * mu);
+    const Vec3f d = top ? Vec3f(s, 0, -mu) : Vec3f(s, 0, mu);  // camera ray into the slab
+    const Vec3d entry(0, 0, top ? c.tau / 2 : -c.tau / 2);
+    const Estimate e = estimate(*path, entry - Vec3d(d), d, 120000, total);
+    EXPECT_NEAR(e.mean, row.value, 4 * e.error) << row.quantity << " mu " << row.at;
+    EXPECT_LT(e.error, 0.2 * row.value) << row.quantity << " mu " << row.at;
+    ++checked;
+  }
+  EXPECT_EQ(checked, 8);
+}
+
+INSTANTIATE_TEST_SUITE_P(Reference, SlabRadiance,
+                         testing::Values(RadianceCase{0.5, 0.9, 0.0}, RadianceCase{0.5, 0.99, 0.7},
+                                         RadianceCase{2, 0.9, 0.7}, RadianceCase{2, 1.0, 0.0},
+                                         RadianceCase{8, 0.99, 0.7}, RadianceCase{8, 0.5, 0.0}));
+
+}  // namespace
+
+}  // namespace photosphere::test

@@ -1,0 +1,51 @@
+#pragma once
+// Small frames of media with known structure, by path tracing and by the photosphere.
+
+#include <memory>
+
+#include "photosphere/estimators/light_field.h"
+#include "photosphere/image/metrics.h"
+#include "photosphere/render/frame.h"
+#include "support/media.h"
+
+namespace photosphere::test {
+
+/// Smoke, lamps and a camera in metres about the origin.
+struct TestScene {
+  std::unique_ptr<transport::Medium> medium;
+  transport::LightList lights;
+  std::unique_ptr<cameras::Camera> camera;
+  std::vector<Vec3f> particles;  ///< carriers, where a test asks for them
+
+  estimators::View view() const;
+};
+
+/// Camera at `eye` that looks at the origin, z up, horizontal field of view in degrees.
+std::unique_ptr<cameras::Camera> perspectiveCamera(const Vec3d& eye, double fov, int pixels);
+
+/// Homogeneous sphere of optical depth `tau` across, radius 0.5, lit by a spot from the side.
+TestScene sphereScene(double tau, double albedo, double g, int cells, int pixels);
+/// Fractal plume in a unit cube, lit by a spot from above and the side.
+TestScene plumeScene(double g, int cells, int pixels);
+
+/// A frame rendered by path tracing.
+render::FrameLayers renderPath(const TestScene& scene, int samples, std::uint64_t seed);
+
+struct PhotosphereFrame {
+  render::FrameLayers layers;
+  transport::TraceStatistics statistics;
+  double traceSeconds = 0, resolveSeconds = 0, marchSeconds = 0;
+};
+/// A frame rendered by the photosphere; layout.radius 0 = automatic.
+PhotosphereFrame renderPhotosphere(const TestScene& scene, estimators::LightFieldLayout layout,
+                                   std::uint64_t photons, std::uint64_t seed, int samples = 4);
+
+/// Error of one layer against the mean of two independent references, noise subtracted.
+struct LayerError {
+  double relMse = 0, relMseSmoke = 0, meanRatio = 0, referenceNoise = 0;
+};
+LayerError layerError(const std::vector<Rgb>& image, const std::vector<Rgb>& referenceA,
+                      const std::vector<Rgb>& referenceB, const std::vector<Rgb>& transmittance,
+                      int width);
+
+}  // namespace photosphere::test
