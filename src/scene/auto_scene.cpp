@@ -1,0 +1,241 @@
+// The scene that `render FILE.vdb` uses: a user starts from a picture and edits.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "photosphere/core/error.h"
+#include "photosphere/core/frames.h"
+#include "photosphere/scene/frame_setup.h"
+#include "photosphere/scene/scene_file.h"
+#include "photosphere/transport/tracking.h"
+#include "photosphere/volume/vdb_file.h"
+#include "volume_source.h"
+
+namespace photosphere::scene {
+
+namespace {
+
+constexpr double kFov = 30.0;
+constexpr double kAlbedo = 0.9, kAnisotropy = 0.4;
+constexpr double kMedianDepth = 5.0;
+
+// Irradiance at the smoke's centre [W/m^2]. Smoke this deep of albedo 0.9 and g 0.4 acts like an
+// isotropic medium of albedo (1-g) w / (1 - g w) = 0.84, whose diffuse reflectance (1 - s) / (1 +
+// s), s = sqrt(1 - 0.84), is 0.43. At about 50 degrees of incidence a thick side then shows 0.43 *
+// cos(50) * E / pi = 0.09 E. 2 pi puts it at 0.55 and thin smoke near middle grey, with room
+// below 1.
+constexpr double kIrradiance = 2.0 * kPi;
+
+bool holds(const std::string& text, std::string_view word) {
+  std::string lower = text;
+  std::transform(lower.begin(), lower.end(), lower.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return lower.find(word) != std::string::npos;
+}
+
+bool isLevelSet(const volume::Grid& grid) {
+  const auto metadata = grid.metadata();
+  const auto found = metadata.find("class");
+  return found != metadata.end() && holds(found->second, "level set");
+}
+
+std::string chooseDensity(const CacheGrids& cache, std::vector<std::string>& choices) {
+  std::vector<std::string> fog;
+  for (const volume::Grid& grid : cache.grids) {
+    if (grid.kind() != volume::GridKind::scalar || isLevelSet(grid)) continue;
+    if (grid.name() == "density") {
+      choices.push_back("The grid 'density' is the smoke.");
+      return "density";
+    }
+    if (grid.valueType().starts_with("float") || grid.valueType().starts_with("half") ||
+        grid.valueType().starts_with("double"))
+      fog.push_back(grid.name());
+  }
+  if (fog.size() == 1) {
+    choices.push_back(fmt::format("The only fog grid, '{}', is the smoke.", fog.front()));
+    return fog.front();
+  }
+  if (cache.grids.empty() && !cache.pointGrids.empty()) {
+    choices.push_back("The file holds points alone; they are rasterized.");
+    return "density";
+  }
+  throw InputError(cache.path,
+                   fmt::format("no grid is named 'density' and {} could be one (the file has {}); "
+                               "say which with -s volume.0.density=NAME",
+                               fog.empty() ? "none" : "several", cache.listing()));
+}
+
+// Which axis is up is nowhere in a .vdb. Houdini's world is Y up, Blender's Z up; both leave their
+// name in metadata. Else the shape decides: smoke rises.
+Vec3d chooseUp(const CacheGrids& cache, const Box3d& box, std::vector<std::string>& choices) {
+  std::string all;
+  if (cache.path.ends_with(".vdb"))
+    for (const auto& [key, value] : volume::readVdb(cache.path).metadata)
+      all += key + "=" + value + "\n";
+  for (const volume::Grid& grid : cache.grids)
+    for (const auto& [key, value] : grid.metadata())
+      all += key + "=" + value + "\n";
+  const bool blender = holds(all, "blender"), houdini = holds(all, "houdini");
+  if (blender != houdini) {
+    choices.push_back(blender ? "Z is up: the file was written by Blender."
+                              : "Y is up: the file was written by Houdini.");
+    return blender ? Vec3d(0, 0, 1) : Vec3d(0, 1, 0);
+  }
+  const Vec3d e = box.extent();
+  if (e.z > 1.2 * e.y && e.z > 1.2 * e.x) {
+    choices.push_back("Z is up: the smoke is tallest along Z, and no metadata says otherwise.");
+    return {0, 0, 1};
+  }
+  choices.push_back("Y is up, as nothing in the file says otherwise.");
+  return {0, 1, 0};
+}
+
+// Optical depths at density_scale 1 of rays along the three axes that meet smoke, sorted.
+std::vector<double> axisDepths(const transport::Medium& medium) {
+  constexpr int kRays = 48;
+  std::vector<double> depths;
+  const Box3d& box = medium.bounds();
+  const auto step = static_cast<float>(medium.voxelEdge());
+  double largest = 0;
+  for (int axis = 0; axis < 3; ++axis)
+    for (int i = 0; i < kRays * kRays; ++i) {
+      Vec3d from = box.min;
+      const int a = (axis + 1) % 3, b = (axis + 2) % 3;
+      from[a] += (i % kRays + 0.5) / kRays * box.extent()[a];
+      from[b] += (i / kRays + 0.5) / kRays * box.extent()[b];
+      Vec3f d(0.0f);
+      d[axis] = 1.0f;
+      const double depth = static_cast<double>(transport::marchOpticalDepth(
+          medium, Vec3f(from), d, static_cast<float>(box.extent()[axis]), step));
+      largest = std::max(largest, depth);
+      depths.push_back(depth);
+    }
+  // Columns of stray voxels would drag the median down.
+  std::erase_if(depths, [&](double d) { return !(d > 0.01 * largest); });
+  std::sort(depths.begin(), depths.end());
+  return depths;
+}
+
+double twoDigits(double value) {
+  const double unit = std::pow(10.0, std::floor(std::log10(value)) - 1);
+  return std::round(value / unit) * unit;
+}
+
+double chooseScale(const transport::Medium& medium, std::vector<std::string>& choices) {
+  const std::vector<double> depths = axisDepths(medium);
+  if (depths.empty() || !(depths[depths.size() / 2] > 0)) return 1.0;
+  const double median = depths[depths.size() / 2];
+  const double high = depths[depths.size() * 9 / 10];
+  const double scale = twoDigits(kMedianDepth / median);
+  choices.push_back(
+      fmt::format("density_scale = {:g}: the median optical depth along the axes becomes {:.1f} "
+                  "(90 % lie below "
+                  "{:.1f}); it would be {:.3g} at scale 1.",
+                  scale, median * scale, high * scale, median));
+  return scale;
+}
+
+std::string vectorText(const Vec3d& v) {
+  return fmt::format("[{:.9g}, {:.9g}, {:.9g}]", v.x, v.y, v.z);
+}
+
+// A spot above the camera's left shoulder, four radii away, whose cone just holds the smoke.
+std::string keyLight(const Box3d& box, const Vec3d& up, const Mat4d& camera,
+                     std::vector<std::string>& choices) {
+  const double radius = 0.5 * glm::length(box.extent());
+  const Vec3d direction = glm::normalize(up - 0.9 * Vec3d(camera[0]) + 0.35 * Vec3d(camera[2]));
+  const double distance = 4.0 * radius;
+  const double angle = std::asin(1.0 / 4.0) * 180 / kPi * 1.2;
+  const double intensity = kIrradiance * distance * distance;  // I = E d^2
+  choices.push_back(fmt::format(
+      "Key light: a spot from above and the left, {:.4g} away; its intensity of {:.4g} W/sr gives "
+      "the centre an irradiance of 2 pi W/m^2, which exposes smoke of this albedo well.",
+      distance, intensity));
+  return fmt::format(
+      "[[light]]\ntype = \"spot\"\nname = \"key\"\nposition = {}\ntarget = {}\nintensity = {:.9g}\n"
+      "cone_angle = {:.6g}\ncone_edge = 2.0\n\n",
+      vectorText(box.center() + direction * distance), vectorText(box.center()), intensity, angle);
+}
+
+std::string quoted(const std::string& text) {
+  static constexpr Param row = {.name = "text", .type = ParamType::text};
+  ParamValues values(std::span<const Param>(&row, 1));
+  values.set("text", text, "scene");
+  return values.format("text");
+}
+
+std::string volumeText(const std::string& file, const std::string& density, double scale) {
+  return fmt::format(
+      "[[volume]]\nfile = {}\ndensity = {}\ndensity_scale = {:g}\nalbedo = {:g}\nphase = {{ type = "
+      "\"henyey_greenstein\", g = {:g} }}\n\n",
+      quoted(file), quoted(density), scale, kAlbedo, kAnisotropy);
+}
+
+// The overrides that decide what the smoke is, which everything else is chosen from.
+std::vector<std::string> volumeSets(const std::vector<std::string>& sets) {
+  std::vector<std::string> chosen;
+  for (const std::string& set : sets)
+    if (set.starts_with("volume.") || set.starts_with("scene.") || set.starts_with("camera.res"))
+      chosen.push_back(set);
+  return chosen;
+}
+
+bool isSet(const std::vector<std::string>& sets, std::string_view key) {
+  return std::any_of(sets.begin(), sets.end(), [&](const std::string& set) {
+    return set.starts_with(key) && set.substr(key.size()).starts_with("=");
+  });
+}
+
+std::string cameraText(const Box3d& box, const Vec3d& up, const Vec2i& resolution,
+                       Mat4d& placement) {
+  placement = frameBox(box, box.center(), up, kFov, resolution);
+  return fmt::format(
+      "[camera]\ntype = \"perspective\"\nposition = {}\nlook_at = {}\nup = {}\nfov = {}\n\n",
+      vectorText(Vec3d(placement[3])), vectorText(box.center()), vectorText(up), kFov);
+}
+
+}  // namespace
+
+SceneFile sceneForVolume(const std::filesystem::path& path, const std::vector<std::string>& sets) {
+  const std::string pattern = std::filesystem::absolute(path).lexically_normal().string();
+  std::int64_t frame = 1;
+  std::vector<std::string> choices;
+  if (hasFrameToken(pattern)) {
+    const std::vector<std::int64_t> frames = findFrames(pattern);
+    if (frames.empty()) throw InputMissingError(pattern, "no frame of this sequence exists");
+    frame = frames[frames.size() / 2];
+    choices.push_back(fmt::format(
+        "Camera and density_scale are chosen from frame {}, the middle of the sequence.", frame));
+  }
+  const std::string folder = std::filesystem::path(pattern).parent_path().string();
+  const CacheGrids cache = readCacheGrids(framePath(pattern, frame));
+  const std::string density =
+      isSet(sets, "volume.0.density") ? "density" : chooseDensity(cache, choices);
+
+  // A first set-up at scale 1 says where the smoke is and how deep.
+  const SceneFile probe =
+      parseScene(volumeText(pattern, density, 1.0), pattern, folder, volumeSets(sets));
+  const FrameSetup smoke = setUpFrame(probe, frame);
+  if (smoke.worldBounds.empty())
+    throw InputError(framePath(pattern, frame), fmt::format("grid '{}' holds no smoke", density));
+  const double scale = isSet(sets, "volume.0.density_scale")
+                           ? probe.volumes.front().values.vec3("density_scale").x
+                           : chooseScale(*smoke.medium, choices);
+  const Vec3d up = chooseUp(cache, smoke.worldBounds, choices);
+  Mat4d camera(1.0);
+  std::string text =
+      cameraText(smoke.worldBounds, up, Vec2i(probe.camera.vec2("resolution")), camera);
+  choices.push_back(
+      "The camera frames the smoke from the front, a little from the right and above.");
+  text += volumeText(pattern, density, scale);
+  text += keyLight(smoke.worldBounds, up, camera, choices);
+  choices.push_back(fmt::format("albedo = {}, g = {}: bright smoke that scatters forward.", kAlbedo,
+                                kAnisotropy));
+  SceneFile scene = parseScene(text, pattern, folder, sets);
+  scene.choices = std::move(choices);
+  return scene;
+}
+
+}  // namespace photosphere::scene

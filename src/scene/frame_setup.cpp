@@ -1,0 +1,342 @@
+#include "photosphere/scene/frame_setup.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "photosphere/core/error.h"
+#include "photosphere/core/frames.h"
+#include "photosphere/core/registry.h"
+#include "photosphere/core/resources.h"
+#include "photosphere/phase/phase.h"
+#include "photosphere/volume/rasterize.h"
+#include "volume_source.h"
+
+namespace photosphere::scene {
+
+namespace {
+
+Mat4d localFromWorld(const lights::LocalSpace& space) {
+  Mat4d m(space.metersPerUnit);
+  m[3] = glm::dvec4(-space.center * space.metersPerUnit, 1.0);
+  return m;
+}
+
+Mat4d nodeShift(const Vec3i& origin) {
+  Mat4d m(1.0);
+  m[3] = glm::dvec4(Vec3d(origin), 1.0);
+  return m;
+}
+
+std::uint64_t memoryBudget(const SceneFile& scene) {
+  const double limit = scene.render.real("memory_limit");
+  if (limit < 0) return 0;
+  const double bytes = limit > 0 ? limit * 1024.0 * 1024.0 * 1024.0
+                                 : 0.85 * static_cast<double>(availableMemoryBytes());
+  return static_cast<std::uint64_t>(std::max(1.0, std::min(bytes, 9e18)));
+}
+
+transport::MediumVolume placeVolume(const VolumeEntry& entry, const VolumeSource& source,
+                                    const lights::LocalSpace& space, std::uint64_t budget) {
+  transport::MediumVolume placed;
+  placed.name = source.density.name();
+  placed.density = volume::bricksFromGrid(source.density, 0, source.path, false, budget);
+  placed.localFromNode = localFromWorld(space) * source.worldFromIndex(source.density) *
+                         nodeShift(placed.density.origin());
+  placed.densityScale = entry.values.vec3("density_scale").x;
+  placed.albedo = entry.values.rgb("albedo");
+  if (source.albedo) {
+    const int components = source.albedo.kind() == volume::GridKind::vector ? 3 : 1;
+    for (int c = 0; c < components; ++c)
+      placed.albedoFields.push_back(
+          volume::bricksFromGrid(source.albedo, c, source.path, false, budget));
+    placed.localFromAlbedoNode = localFromWorld(space) * source.worldFromIndex(source.albedo) *
+                                 nodeShift(placed.albedoFields.front().origin());
+  }
+  placed.phase = findPlugin(phase::phaseFunctions(), entry.phase, "phase", entry.where)
+                     .create(entry.phaseValues);
+  return placed;
+}
+
+// Two passes: where the smoke is, then the smoke about its own centre.
+void buildMedium(const SceneFile& scene, std::int64_t cacheFrame, bool wantParticles,
+                 FrameSetup& setup) {
+  std::vector<VolumeSource> sources;
+  for (const VolumeEntry& entry : scene.volumes) {
+    sources.push_back(readVolume(scene, entry, cacheFrame, wantParticles));
+    setup.readSeconds += sources.back().readSeconds;
+    setup.rasterizeSeconds += sources.back().rasterizeSeconds;
+    setup.worldBounds.grow(sources.back().bounds());
+    for (const std::string& note : sources.back().notes)
+      setup.notes.push_back(note);
+  }
+  setup.space.metersPerUnit = scene.scene.real("meters_per_unit");
+  if (!setup.worldBounds.empty()) setup.space.center = setup.worldBounds.center();
+
+  const Stopwatch watch;
+  std::vector<transport::MediumVolume> placed;
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    for (const Vec3d& p : sources[i].particles)
+      setup.particles.emplace_back(setup.space.localFromWorld(p));
+    const double scale = scene.volumes[i].values.vec3("density_scale").x;
+    if (sources[i].bounds().empty() || !(scale > 0)) {
+      setup.notes.push_back(fmt::format("{}: no smoke in it at this frame", sources[i].path));
+      continue;
+    }
+    placed.push_back(placeVolume(scene.volumes[i], sources[i], setup.space, setup.memoryBudget));
+    if (placed.back().density.empty()) placed.pop_back();
+  }
+  setup.medium = std::make_unique<transport::Medium>(std::move(placed));
+  // Active voxels may hold zeros: what frames the smoke is the box of what scatters.
+  setup.worldBounds = Box3d();
+  if (const Box3d& local = setup.medium->bounds(); !local.empty()) {
+    setup.worldBounds.grow(setup.space.worldFromLocal(local.min));
+    setup.worldBounds.grow(setup.space.worldFromLocal(local.max));
+  }
+  setup.readSeconds += watch.seconds();
+}
+
+void buildLights(const SceneFile& scene, FrameSetup& setup) {
+  for (const LightEntry& entry : scene.lights) {
+    if (entry.type == "environment" && scene.effects.text("environment") == "off") continue;
+    const lights::LightPlugin& plugin =
+        findPlugin(lights::lightModels(), entry.type, "light type", entry.where);
+    try {
+      setup.lights.push_back(plugin.create(entry.values, setup.space));
+    } catch (const ConfigError& error) {
+      throw ConfigError(fmt::format("{}: {}", entry.where, error.what()));
+    }
+    setup.lights.back()->setName(entry.values.text("name"));
+  }
+}
+
+Vec2i resolutionOf(const SceneFile& scene, const SetupOptions& options) {
+  return options.resolution ? *options.resolution : Vec2i(scene.camera.vec2("resolution"));
+}
+
+// Degrees across the frame, as the camera's own options say.
+double horizontalFov(const ParamValues& camera) {
+  if (camera.given("focal_length") || camera.given("horizontal_aperture"))
+    return 2 * std::atan(camera.real("horizontal_aperture") / 2 / camera.real("focal_length")) *
+           180 / kPi;
+  return camera.real("fov");
+}
+
+// The width at which parallel rays from `placement` see the whole box.
+double widthOfBox(const Box3d& box, const Vec3d& target, const Mat4d& placement,
+                  const Vec2i& resolution) {
+  double half = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    const Vec3d p(corner & 1 ? box.max.x : box.min.x, corner & 2 ? box.max.y : box.min.y,
+                  corner & 4 ? box.max.z : box.min.z);
+    const double x = std::abs(glm::dot(p - target, Vec3d(placement[0])));
+    const double y = std::abs(glm::dot(p - target, Vec3d(placement[1])));
+    half = std::max(half, std::max(x, y * resolution.x / resolution.y));
+  }
+  return 2.16 * half;
+}
+
+void buildCamera(const SceneFile& scene, const SetupOptions& options, FrameSetup& setup) {
+  const cameras::CameraPlugin& plugin =
+      findPlugin(cameras::cameraModels(), scene.cameraType, "camera type", scene.cameraWhere);
+  const Vec2i resolution = resolutionOf(scene, options);
+  ParamValues values = scene.camera;
+  try {
+    Mat4d placement;
+    if (scene.framesSmoke() && !setup.worldBounds.empty()) {
+      const Vec3d target =
+          scene.camera.given("look_at") ? scene.camera.vec3("look_at") : setup.worldBounds.center();
+      const double fov = scene.cameraType == "perspective" ? horizontalFov(scene.camera) : 30.0;
+      placement = frameBox(setup.worldBounds, target, scene.camera.vec3("up"), fov, resolution);
+      if (scene.cameraType == "orthographic" && !values.given("width"))
+        values.set("width", widthOfBox(setup.worldBounds, target, placement, resolution),
+                   scene.cameraWhere);
+      setup.notes.push_back(
+          "[camera] has neither 'position' nor 'matrix': it frames the smoke of each frame anew; "
+          "place it to hold it still over a sequence");
+    } else {
+      placement = cameras::worldFromCameraValues(scene.camera);
+    }
+    setup.camera = plugin.create(values, placement, resolution);
+  } catch (const ConfigError& error) {
+    throw ConfigError(fmt::format("{}: {}", scene.cameraWhere, error.what()));
+  }
+  setup.view.hasEye = setup.camera->hasEye();
+  setup.view.eye = setup.space.localFromWorld(setup.camera->position());
+  setup.view.direction = Vec3f(setup.camera->viewDirection());
+}
+
+class EffectPlan {
+ public:
+  EffectPlan(const SceneFile& scene, FrameSetup& setup) : m_scene(scene), m_setup(setup) {}
+
+  void decide() {
+    Effects& e = m_setup.effects;
+    const std::string dark = m_setup.medium->bounds().empty() ? "there is no smoke"
+                             : m_setup.lights.empty()         ? "there is no light"
+                             : m_setup.medium->maximumAlbedo() <= 0
+                                 ? "the smoke only absorbs (albedo 0)"
+                                 : "";
+    const bool single = m_scene.estimator.text("type") == "single";
+    e.emission = note("emission", false, "no volume emits");
+    e.singleScattering = unlessOff("single_scattering", dark, "lights reach smoke that scatters");
+    e.multipleScattering =
+        unlessOff("multiple_scattering", single ? "estimator.type is single" : dark,
+                  "lights reach smoke that scatters");
+    e.shadows = unlessOff("shadows", dark, "smoke casts shadows on itself");
+    chromatic();
+    e.motionBlur = note("motion_blur", false, "no volume has a velocity");
+    e.depthOfField = note("depth_of_field", false, "the camera is a pinhole");
+    bool surroundings = false;
+    for (const LightEntry& light : m_scene.lights)
+      surroundings = surroundings || light.type == "environment";
+    e.environment = unlessOff("environment", surroundings ? "" : "there is no environment light",
+                              "an environment shines");
+  }
+
+ private:
+  bool note(const std::string& name, bool on, const std::string& why) {
+    m_setup.effectStates.push_back({name, on, why});
+    return on;
+  }
+  // @param never  why it cannot contribute; empty when it can
+  bool unlessOff(const std::string& name, const std::string& never, const std::string& why) {
+    if (m_scene.effects.text(name) == "off") return note(name, false, "off in the scene");
+    return never.empty() ? note(name, true, why) : note(name, false, never);
+  }
+  void chromatic() {
+    std::string coloured = m_setup.medium->isGrey() ? "" : "an albedo is coloured";
+    for (const auto& light : m_setup.lights)
+      if (!light->isGrey()) coloured = fmt::format("light '{}' is coloured", light->name());
+    const std::string& wish = m_scene.effects.text("chromatic");
+    if (wish == "off" && !coloured.empty())
+      throw ConfigError(
+          fmt::format("[effects]: chromatic = \"off\", but {}; one channel cannot "
+                      "hold that, so make it grey or leave chromatic at auto",
+                      coloured));
+    m_setup.effects.chromatic =
+        wish == "on" ? note("chromatic", true, "on in the scene")
+                     : note("chromatic", !coloured.empty(),
+                            coloured.empty() ? "lights and albedos are grey" : coloured);
+  }
+
+  const SceneFile& m_scene;
+  FrameSetup& m_setup;
+};
+
+// Nearest-neighbour spacing of the carriers [m].
+double carrierSpacing(const std::vector<Vec3f>& particles) {
+  volume::ParticleSet set;
+  set.positions.assign(particles.begin(), particles.end());
+  return set.size() > 1 ? volume::medianSpacing(set) : 0.0;
+}
+
+void buildLayout(const SceneFile& scene, const SetupOptions& options, FrameSetup& setup) {
+  using namespace estimators;
+  const ParamValues& e = scene.estimator;
+  LightFieldLayout& l = setup.layout;
+  const std::string& basis = e.text("basis");
+  const bool cached = options.forLightCache || !e.text("cache").empty();
+  l.carrier = e.text("carrier") == "particles" ? Carrier::particles : Carrier::voxels;
+  l.basis = basis == "view" || (basis == "auto" && !cached) ? Basis::view : Basis::histogram;
+  l.deposit = e.text("deposit") == "collision" ? Deposit::collision : Deposit::trackLength;
+  l.energy = e.text("energy") == "scatter" ? EnergyRule::scatter : EnergyRule::gather;
+  const std::string& kernel = e.text("spatial_kernel");
+  l.kernel = kernel == "box"        ? SpatialKernel::box
+             : kernel == "gaussian" ? SpatialKernel::gaussian
+                                    : SpatialKernel::epanechnikov;
+  l.rows = static_cast<int>(e.integer("rows"));
+  l.channels = setup.effects.chromatic ? 3 : 1;
+  l.phases = static_cast<int>(setup.medium->phases().size());
+  for (const auto& light : setup.lights)
+    l.unscattered = l.unscattered || (!light->isDelta() && setup.effects.singleScattering);
+  l.lightVoxel = e.real("light_voxel");
+  l.radius = e.real("radius") * setup.space.metersPerUnit;
+  if (!(l.radius > 0)) {
+    l.radius = automaticRadius(*setup.medium, l, static_cast<std::uint64_t>(e.integer("photons")));
+    // About 20 particles where they fill space evenly: a ball of 3 spacings.
+    if (l.carrier == Carrier::particles)
+      l.radius = std::max(l.radius, 3.0 * carrierSpacing(setup.particles));
+  }
+  const double deposit = e.real("deposit_radius") * setup.space.metersPerUnit;
+  l.depositRadius = deposit > 0 ? deposit : l.radius;
+}
+
+}  // namespace
+
+FrameSetup setUpFrame(const SceneFile& scene, std::int64_t frame, const SetupOptions& options) {
+  FrameSetup setup;
+  setup.frame = frame;
+  setup.memoryBudget = memoryBudget(scene);
+  const bool particles = scene.estimator.text("type") == "photosphere" &&
+                         scene.estimator.text("carrier") == "particles";
+  buildMedium(scene, options.cacheFrame.value_or(frame), particles, setup);
+  buildLights(scene, setup);
+  buildCamera(scene, options, setup);
+  EffectPlan(scene, setup).decide();
+  buildLayout(scene, options, setup);
+  const std::int64_t seed = options.seed.value_or(scene.scene.integer("seed"));
+  setup.key = RandomKey::fromSeed(static_cast<std::uint64_t>(seed),
+                                  scene.scene.flag("seed_per_frame") ? frame : 0);
+  return setup;
+}
+
+std::uint64_t predictedLightFieldBytes(const FrameSetup& setup) {
+  const estimators::LightFieldLayout& l = setup.layout;
+  const auto values = static_cast<std::uint64_t>(l.valuesPerCarrier());
+  constexpr std::uint64_t kBytes = sizeof(std::int64_t) + sizeof(float);
+  const transport::Medium& medium = *setup.medium;
+  if (medium.bounds().empty()) return 0;
+  std::uint64_t bytes = 0;
+  if (l.carrier == estimators::Carrier::particles) bytes = setup.particles.size() * values * kBytes;
+  if (l.holdsPower()) return bytes;
+  const double edge = l.lightVoxel * medium.voxelEdge();
+  const int margin = static_cast<int>(std::ceil(l.radius / edge)) + 1;
+  // A full box is an upper bound that costs nothing; only a large one is worth counting exactly.
+  const Vec3d cells = glm::ceil(medium.bounds().extent() / edge) + 2.0 * margin + 8.0;
+  const double perVoxel = static_cast<double>(values * kBytes);
+  const double most = cells.x * cells.y * cells.z * perVoxel;
+  if (setup.memoryBudget == 0 || most < 0.5 * static_cast<double>(setup.memoryBudget))
+    return bytes + static_cast<std::uint64_t>(most);
+  return bytes + transport::SupportLattice(medium, edge, margin).size() * values * kBytes;
+}
+
+void checkMemory(const FrameSetup& setup, bool lightField) {
+  if (setup.memoryBudget == 0) return;
+  const std::uint64_t smoke = setup.medium->memoryBytes();
+  const std::uint64_t light = lightField ? predictedLightFieldBytes(setup) : 0;
+  const Vec2i size = setup.camera->resolution();
+  const std::uint64_t frame = static_cast<std::uint64_t>(size.x) *
+                              static_cast<std::uint64_t>(size.y) *
+                              (6 * sizeof(Rgb) + 2 * sizeof(float));
+  if (smoke + light + frame <= setup.memoryBudget) return;
+  throw MemoryError(fmt::format(
+      "this frame needs about {}: {} for the smoke, {} for stored light, {} for pixels; the budget "
+      "is {}. Raise estimator.light_voxel, lower estimator.rows (a histogram has 8 * rows^2 bins; "
+      "basis = \"view\" has one), lower the resolution, or raise render.memory_limit (-1 = none)",
+      formatBytes(smoke + light + frame), formatBytes(smoke), formatBytes(light),
+      formatBytes(frame), formatBytes(setup.memoryBudget)));
+}
+
+Mat4d frameBox(const Box3d& box, const Vec3d& target, const Vec3d& up, double fovDegrees,
+               const Vec2i& resolution) {
+  // The front is +Z where Y is up, -Y where Z is up.
+  const bool zUp = std::abs(up.z) > std::abs(up.y);
+  const Vec3d toEye = glm::normalize(zUp ? Vec3d(0.5, -1.0, 0.3) : Vec3d(0.5, 0.3, 1.0));
+  const Mat4d axes = cameras::lookAt(target + toEye, target, up);
+  const double tanX = std::tan(fovDegrees * kPi / 360);
+  const double tanY = tanX * resolution.y / resolution.x;
+  double distance = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    const Vec3d p(corner & 1 ? box.max.x : box.min.x, corner & 2 ? box.max.y : box.min.y,
+                  corner & 4 ? box.max.z : box.min.z);
+    const Vec3d d = p - target;
+    const double x = std::abs(glm::dot(d, Vec3d(axes[0])));
+    const double y = std::abs(glm::dot(d, Vec3d(axes[1])));
+    distance = std::max(distance, std::max(x / tanX, y / tanY) + glm::dot(d, toEye));
+  }
+  constexpr double kMargin = 1.08;
+  return cameras::lookAt(target + toEye * std::max(distance * kMargin, 1e-9), target, up);
+}
+
+}  // namespace photosphere::scene

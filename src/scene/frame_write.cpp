@@ -1,0 +1,138 @@
+// A frame as a file: channels, header, preview.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "photosphere/core/error.h"
+#include "photosphere/core/frames.h"
+#include "photosphere/core/registry.h"
+#include "photosphere/core/resources.h"
+#include "photosphere/core/version.h"
+#include "photosphere/image/color.h"
+#include "photosphere/image/preview.h"
+#include "photosphere/scene/pipeline.h"
+
+namespace photosphere::scene {
+
+namespace {
+
+void copyLayer(image::Image& to, const std::string& layer, image::ChannelKind kind,
+               const std::vector<Rgb>& pixels) {
+  to.addLayer(layer, kind);
+  constexpr std::string_view letters[] = {"R", "G", "B"};
+  for (int c = 0; c < 3; ++c) {
+    const std::span<float> out =
+        to.channel(image::Image::channelName(layer, letters[static_cast<std::size_t>(c)]));
+    for (std::size_t i = 0; i < pixels.size(); ++i)
+      out[i] = pixels[i][c];
+  }
+}
+
+void copyPlane(image::Image& to, const std::string& name, const std::vector<float>& pixels) {
+  const std::span<float> out = to.addChannel(name);
+  std::copy(pixels.begin(), pixels.end(), out.begin());
+}
+
+image::Image emptyImage(const render::FrameLayers& layers) {
+  const image::Window data{layers.crop.min.x, layers.crop.min.y, layers.width(), layers.height()};
+  return {data, {0, 0, layers.resolution.x, layers.resolution.y}};
+}
+
+std::string secondsText(const StageSeconds& s) {
+  return fmt::format("read {:.3f}, rasterize {:.3f}, trace {:.3f}, resolve {:.3f}, march {:.3f}",
+                     s.read, s.rasterize, s.trace, s.resolve, s.march);
+}
+
+std::string effectsText(const std::vector<EffectState>& effects) {
+  std::vector<std::string> parts;
+  for (const EffectState& effect : effects)
+    parts.push_back(fmt::format("{} {}", effect.name, effect.on ? "on" : "off"));
+  return fmt::format("{}", fmt::join(parts, ", "));
+}
+
+image::ExrAttributes header(const FrameResult& result,
+                            const std::optional<image::Chromaticities>& chromaticities) {
+  const FrameStatistics& s = result.statistics;
+  image::FrameMetadata metadata;
+  metadata.worldToCamera = result.cameraFromWorld;
+  metadata.worldToNDC = result.ndcFromWorld;
+  metadata.chromaticities = chromaticities;
+  metadata.framesPerSecond = result.framesPerSecond;
+  metadata.frame = result.frame;
+  metadata.capDate = image::currentCapDate();
+  metadata.software = versionText();
+  auto& own = metadata.photosphere;
+  own["estimator"] = result.estimator;
+  own["photons"] = fmt::format("emitted {}, stored {}", s.photonsEmitted, s.photonsStored);
+  if (!result.layout.empty()) {
+    own["radius"] = fmt::format("{:.6g}", result.radius);
+    own["histogram"] = result.layout;
+  }
+  own["scene_hash"] = s.sceneHash;
+  own["medium_hash"] = s.mediumHash;
+  own["seed"] = std::to_string(result.seed);
+  own["effects"] = effectsText(s.effects);
+  own["seconds"] = secondsText(s.seconds);
+  own["peak_memory_bytes"] = std::to_string(s.peakMemoryBytes);
+  return image::frameAttributes(metadata);
+}
+
+}  // namespace
+
+image::Image frameImage(const FrameResult& result, const std::vector<std::string>& aovs) {
+  const std::vector<std::string_view> present(result.layerNames.begin(), result.layerNames.end());
+  for (const std::string& name : aovs)
+    if (std::find(present.begin(), present.end(), name) == present.end())
+      throw ConfigError(fmt::format("[output]: aovs: this frame has no layer '{}'{} (it has: {})",
+                                    name, suggestion(name, present), fmt::join(present, ", ")));
+  const auto wanted = [&](std::string_view name) {
+    return std::find(present.begin(), present.end(), name) != present.end() &&
+           (aovs.empty() || std::find(aovs.begin(), aovs.end(), name) != aovs.end());
+  };
+  const render::FrameLayers& layers = result.layers;
+  image::Image out = emptyImage(layers);
+  if (wanted("beauty")) {
+    copyLayer(out, "", image::ChannelKind::color, layers.beauty);
+    copyPlane(out, "A", layers.alpha);
+  }
+  using Pixels = std::vector<Rgb> render::FrameLayers::*;
+  const std::pair<std::string, Pixels> colours[] = {
+      {"single", &render::FrameLayers::single},
+      {"multiple", &render::FrameLayers::multiple},
+      {"emission", &render::FrameLayers::emission},
+      {"background", &render::FrameLayers::background},
+      {"transmittance", &render::FrameLayers::transmittance}};
+  for (const auto& [name, pixels] : colours)
+    if (wanted(name)) copyLayer(out, name, image::ChannelKind::color, layers.*pixels);
+  if (wanted("depth")) copyPlane(out, "Z", layers.depth);
+  return out;
+}
+
+void writeFrame(FrameResult& result, const SceneFile& scene, const WriteRequest& request) {
+  const Stopwatch watch;
+  const std::string& space = scene.output.text("colorspace");
+  const image::ColorConfig config = image::ColorConfig::load(request.ocioConfig);
+  const auto chromaticities = config.chromaticities(space);
+  if (!request.path.empty()) {
+    image::ExrOptions options;
+    options.floatColor = request.floatColor;
+    options.compression = request.compression;
+    image::writeExr(framePath(request.path, result.frame),
+                    frameImage(result, scene.output.list("aovs")), header(result, chromaticities),
+                    options);
+  }
+  if (!request.preview.empty()) {
+    image::DisplayOptions display;
+    display.renderingSpace = space;
+    display.display = request.ocioDisplay;
+    display.view = request.ocioView;
+    display.exposure = request.exposure;
+    image::writePreview(framePath(request.preview, result.frame), frameImage(result, {"beauty"}),
+                        config, display);
+  }
+  result.statistics.seconds.write = watch.seconds();
+  result.statistics.seconds.total += watch.seconds();
+}
+
+}  // namespace photosphere::scene

@@ -1,0 +1,268 @@
+#include "photosphere/scene/pipeline.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "light_stage.h"
+#include "photosphere/core/error.h"
+#include "photosphere/core/frames.h"
+#include "photosphere/core/log.h"
+#include "photosphere/core/resources.h"
+#include "photosphere/render/integrator.h"
+#include "photosphere/render/shadows.h"
+
+namespace photosphere::scene {
+
+namespace {
+
+render::ShadowMode shadowMode(const std::string& name) {
+  if (name == "march") return render::ShadowMode::march;
+  if (name == "track") return render::ShadowMode::track;
+  return render::ShadowMode::grid;
+}
+
+render::FilterKind filterKind(const std::string& name) {
+  if (name == "box") return render::FilterKind::box;
+  if (name == "triangle") return render::FilterKind::triangle;
+  return render::FilterKind::blackmanHarris;
+}
+
+render::Crop clippedCrop(const std::optional<render::Crop>& wished, const Vec2i& resolution) {
+  if (!wished) return {Vec2i(0), resolution};
+  const render::Crop crop{glm::max(wished->min, Vec2i(0)), glm::min(wished->max, resolution)};
+  if (crop.max.x <= crop.min.x || crop.max.y <= crop.min.y)
+    throw ConfigError(fmt::format("the crop lies outside the frame of {} x {} pixels", resolution.x,
+                                  resolution.y));
+  return crop;
+}
+
+// What a path tracer finds and the scene switched off.
+void dropLayers(const Effects& effects, render::FrameLayers& layers) {
+  if (effects.singleScattering && effects.multipleScattering) return;
+  for (std::size_t i = 0; i < layers.beauty.size(); ++i) {
+    if (!effects.singleScattering) layers.single[i] = Rgb(0.0f);
+    if (!effects.multipleScattering) layers.multiple[i] = Rgb(0.0f);
+    layers.beauty[i] =
+        layers.single[i] + layers.multiple[i] + layers.emission[i] + layers.background[i];
+  }
+}
+
+void checkSamples(const render::FrameLayers& layers) {
+  if (layers.nanSamples == 0 && layers.negativeSamples == 0) return;
+  throw Error(
+      ExitCode::unspecified,
+      fmt::format("{} samples are NaN or infinite and {} negative, the first in pixel "
+                  "({}, {}); the frame is not written. This is a defect: please report it "
+                  "with the scene",
+                  layers.nanSamples, layers.negativeSamples, layers.firstBad.x, layers.firstBad.y));
+}
+
+void measureImage(const render::FrameLayers& layers, FrameStatistics& statistics) {
+  double sum = 0, most = 0;
+  for (const Rgb& pixel : layers.beauty)
+    for (int c = 0; c < 3; ++c) {
+      sum += static_cast<double>(pixel[c]);
+      most = std::max(most, static_cast<double>(pixel[c]));
+    }
+  const auto count = static_cast<double>(std::max<std::size_t>(1, 3 * layers.beauty.size()));
+  statistics.imageMean = sum / count;
+  statistics.imageMax = most;
+}
+
+std::vector<std::string> presentLayers(const FrameSetup& setup) {
+  std::vector<std::string> names{"beauty"};
+  if (setup.effects.singleScattering) names.emplace_back("single");
+  if (setup.effects.multipleScattering) names.emplace_back("multiple");
+  if (setup.effects.emission) names.emplace_back("emission");
+  if (setup.effects.environment) names.emplace_back("background");
+  names.emplace_back("transmittance");
+  names.emplace_back("depth");
+  return names;
+}
+
+std::string describe(const FrameSetup& setup) {
+  using namespace estimators;
+  const LightFieldLayout& l = setup.layout;
+  const std::string basis = l.basis == Basis::view
+                                ? "view"
+                                : fmt::format("histogram of {} bins ({} rows)", l.bins(), l.rows);
+  return fmt::format(
+      "{}, {}, {}, {} channel{}{}", l.carrier == Carrier::particles ? "particles" : "voxels", basis,
+      l.deposit == Deposit::collision ? "collision" : "track_length", l.channels,
+      l.channels == 1 ? "" : "s",
+      l.holdsPower() ? (l.energy == EnergyRule::scatter ? ", scatter" : ", gather") : "");
+}
+
+// The light of a frame, ready to be looked up; null where nothing asks for it.
+struct Light {
+  std::unique_ptr<estimators::InscatterSource> source;
+};
+
+Light prepareLight(const SceneFile& scene, const RenderRequest& request, FrameSetup& setup,
+                   FrameResult& result) {
+  Light light;
+  const bool wanted =
+      scene.estimator.text("type") == "photosphere" && setup.effects.multipleScattering;
+  checkMemory(setup, wanted);
+  if (!wanted) return light;
+  const estimators::LightField field = lightField(scene, request, setup, result.statistics);
+  result.layout = describe(setup);
+  result.radius = setup.layout.radius / setup.space.metersPerUnit;
+  const Stopwatch watch;
+  light.source = estimators::resolve(*setup.medium, field, setup.view);
+  result.statistics.seconds.resolve = watch.seconds();
+  return light;
+}
+
+std::uint64_t shadowBudget(const FrameSetup& setup) {
+  if (setup.memoryBudget == 0) return 0;
+  const std::uint64_t used = setup.medium->memoryBytes();
+  return setup.memoryBudget > used ? setup.memoryBudget - used : 1;
+}
+
+render::FrameOptions frameOptions(const SceneFile& scene, const RenderRequest& request,
+                                  const FrameSetup& setup, bool paths) {
+  render::FrameOptions options;
+  options.samples = static_cast<int>(paths ? scene.estimator.integer("samples")
+                                           : scene.render.integer("samples"));
+  options.filter = filterKind(scene.render.text("filter"));
+  options.filterWidth = scene.render.real("filter_width");
+  options.crop = clippedCrop(request.crop, setup.camera->resolution());
+  options.key = setup.key;
+  options.space = setup.space;
+  return options;
+}
+
+// Rays through the smoke; the estimator's answer is ready.
+void renderLayers(const SceneFile& scene, const RenderRequest& request, const FrameSetup& setup,
+                  const estimators::InscatterSource* source, FrameResult& result) {
+  const Stopwatch watch;
+  const bool paths = scene.estimator.text("type") == "path_traced";
+  const render::FrameOptions options = frameOptions(scene, request, setup, paths);
+  if (paths) {
+    render::PathOptions path;
+    path.maxScatter = static_cast<int>(scene.estimator.integer("max_scatter"));
+    path.effects = setup.effects;
+    const auto integrator = render::makePathIntegrator(*setup.medium, setup.lights, path);
+    result.layers = render::renderFrame(*setup.camera, *integrator, options);
+    dropLayers(setup.effects, result.layers);
+  } else {
+    render::MarchOptions march;
+    march.step = static_cast<float>(scene.render.real("step"));
+    march.effects = setup.effects;
+    const auto mode = setup.effects.singleScattering && setup.effects.shadows
+                          ? shadowMode(scene.render.text("shadow"))
+                          : render::ShadowMode::march;  // tabulates nothing
+    const render::Shadows shadows(*setup.medium, setup.lights, mode,
+                                  march.step * static_cast<float>(setup.medium->voxelEdge()),
+                                  shadowBudget(setup));
+    const auto integrator =
+        render::makeMarchIntegrator(*setup.medium, setup.lights, shadows, source, march);
+    result.layers = render::renderFrame(*setup.camera, *integrator, options);
+  }
+  result.statistics.seconds.march = watch.seconds();
+}
+
+void finish(const FrameSetup& setup, double cpuBefore, FrameResult& result) {
+  FrameStatistics& s = result.statistics;
+  const render::FrameLayers& layers = result.layers;
+  s.nanSamples = layers.nanSamples;
+  s.negativeSamples = layers.negativeSamples;
+  s.majorantViolations += layers.counters.tracking.majorantViolations;
+  s.pathsCapped = layers.counters.capped;
+  s.pathsCappedRadiance = layers.counters.cappedRadiance;
+  if (s.pathsCapped > 0)
+    result.notes.push_back(
+        fmt::format("estimator.max_scatter ended {} paths, which lose {:.4g} of "
+                    "throughput in all",
+                    s.pathsCapped, s.pathsCappedRadiance));
+  if (s.majorantViolations > 0)
+    result.notes.push_back(fmt::format(
+        "{} lookups exceeded their majorant: the frame is biased there", s.majorantViolations));
+  s.effects = setup.effectStates;
+  measureImage(layers, s);
+  s.cpuSeconds = processCpuSeconds() - cpuBefore;
+  s.peakMemoryBytes = peakMemoryBytes();
+}
+
+SetupOptions setupOptions(const RenderRequest& request) {
+  SetupOptions options;
+  options.resolution = request.resolution;
+  options.seed = request.seed;
+  options.cacheFrame = request.cacheFrame;
+  return options;
+}
+
+void startStatistics(const SceneFile& scene, const FrameSetup& setup, FrameStatistics& s) {
+  s.seconds.read = setup.readSeconds;
+  s.seconds.rasterize = setup.rasterizeSeconds;
+  s.sceneHash = scene.hash();
+  s.mediumHash = setup.medium->hash();
+}
+
+}  // namespace
+
+FrameResult renderScene(const SceneFile& scene, std::int64_t frame, const RenderRequest& request) {
+  const Stopwatch total;
+  const double cpuBefore = processCpuSeconds();
+  FrameSetup setup = setUpFrame(scene, frame, setupOptions(request));
+  clippedCrop(request.crop, setup.camera->resolution());  // a wrong crop fails before the work
+  FrameResult result;
+  result.frame = frame;
+  startStatistics(scene, setup, result.statistics);
+  result.layerNames = presentLayers(setup);
+  result.cameraFromWorld = setup.camera->cameraFromWorld();
+  result.ndcFromWorld = setup.camera->ndcFromWorld();
+  result.framesPerSecond = scene.scene.real("fps");
+  result.estimator = scene.estimator.text("type");
+  result.seed = request.seed.value_or(scene.scene.integer("seed"));
+
+  const Light light = prepareLight(scene, request, setup, result);
+  result.notes = setup.notes;
+  renderLayers(scene, request, setup, light.source.get(), result);
+  finish(setup, cpuBefore, result);
+  checkSamples(result.layers);
+  result.statistics.seconds.total = total.seconds();
+  return result;
+}
+
+FrameStatistics traceScene(const SceneFile& scene, std::int64_t frame, const std::string& output,
+                           const RenderRequest& request) {
+  if (scene.estimator.text("type") != "photosphere")
+    throw ConfigError(fmt::format(
+        "estimator.type = \"{}\" stores no light; tracing a light cache needs \"photosphere\"",
+        scene.estimator.text("type")));
+  if (!scene.estimator.text("cache").empty())
+    throw ConfigError(
+        "estimator.cache is set: the light was traced already; remove it to trace anew");
+  if (scene.estimator.text("basis") == "view")
+    throw ConfigError(
+        "estimator.basis = \"view\" holds light for one camera and cannot be cached; use "
+        "\"histogram\" or \"auto\"");
+  const Stopwatch total;
+  const double cpuBefore = processCpuSeconds();
+  SetupOptions options = setupOptions(request);
+  options.forLightCache = true;
+  FrameSetup setup = setUpFrame(scene, frame, options);
+  FrameStatistics statistics;
+  startStatistics(scene, setup, statistics);
+  checkMemory(setup, true);
+  const estimators::LightField field = lightField(scene, request, setup, statistics);
+  const Stopwatch writing;
+  storeLightField(setup, field, framePath(output, frame));
+  statistics.seconds.write = writing.seconds();
+  statistics.effects = setup.effectStates;
+  statistics.cpuSeconds = processCpuSeconds() - cpuBefore;
+  statistics.peakMemoryBytes = peakMemoryBytes();
+  statistics.seconds.total = total.seconds();
+  return statistics;
+}
+
+std::vector<std::int64_t> sceneFrames(const SceneFile& scene) {
+  const std::string& frames = scene.scene.text("frames");
+  return frames.empty() ? std::vector<std::int64_t>{1} : parseFrames(frames);
+}
+
+}  // namespace photosphere::scene

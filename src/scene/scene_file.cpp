@@ -1,0 +1,135 @@
+#include "photosphere/scene/scene_file.h"
+
+#include <fmt/format.h>
+
+#include <fstream>
+#include <sstream>
+
+#include "photosphere/core/error.h"
+#include "photosphere/core/hash.h"
+#include "scene_reader.h"
+
+namespace photosphere::scene {
+
+namespace {
+
+// What decides pixels is all of a scene but the places of its files and its output.
+enum class DumpPurpose { file, hash };
+
+bool isPath(std::string_view table, std::string_view key) {
+  return (table == "volume" && key == "file") || (table == "estimator" && key == "cache") ||
+         (table == "output" && (key == "file" || key == "preview"));
+}
+
+class Dumper {
+ public:
+  Dumper(const SceneFile& scene, DumpPurpose purpose) : m_scene(scene), m_purpose(purpose) {}
+
+  std::string text() {
+    if (m_purpose == DumpPurpose::file)
+      for (const std::string& choice : m_scene.choices)
+        m_text += "# " + choice + "\n";
+    table("scene", "[scene]", m_scene.scene);
+    table("camera", "[camera]", m_scene.camera, fmt::format("type = \"{}\"\n", m_scene.cameraType));
+    for (const VolumeEntry& volume : m_scene.volumes)
+      table("volume", "[[volume]]", volume.values, volumeExtras(volume));
+    for (const LightEntry& light : m_scene.lights)
+      table("light", "[[light]]", light.values, fmt::format("type = \"{}\"\n", light.type));
+    table("estimator", "[estimator]", m_scene.estimator);
+    table("effects", "[effects]", m_scene.effects);
+    table("render", "[render]", m_scene.render);
+    if (m_purpose == DumpPurpose::file) table("output", "[output]", m_scene.output);
+    return m_text;
+  }
+
+ private:
+  std::string volumeExtras(const VolumeEntry& volume) const {
+    std::string phase = fmt::format("phase = {{ type = \"{}\"", volume.phase);
+    for (const Param& row : volume.phaseValues.rows())
+      if (row.served)
+        phase += fmt::format(", {} = {}", row.name, volume.phaseValues.format(row.name));
+    phase += " }\n";
+    if (volume.albedoGrid.empty()) return phase;
+    static constexpr Param row = {.name = "albedo", .type = ParamType::text};
+    ParamValues quoted(std::span<const Param>(&row, 1));
+    quoted.set("albedo", volume.albedoGrid, "dump");
+    return fmt::format("albedo = {}\n{}", quoted.format("albedo"), phase);
+  }
+
+  // Given values as they are; the others as comments with their defaults, ready to be edited.
+  void table(std::string_view name, std::string_view head, const ParamValues& values,
+             const std::string& extras = {}) {
+    m_text += fmt::format("{}{}\n{}", m_text.empty() ? "" : "\n", head, extras);
+    std::string defaults;
+    for (const Param& row : values.rows()) {
+      if (!row.served || (name == "volume" && row.name == "albedo" && extras.starts_with("albedo")))
+        continue;
+      std::string value = values.format(row.name);
+      const bool path = isPath(name, row.name) && !values.text(row.name).empty();
+      const bool frames = name == "scene" && row.name == "frames";
+      if ((path || frames) && m_purpose == DumpPurpose::hash) continue;
+      if (path) {
+        ParamValues absolute = values;
+        absolute.set(row.name, m_scene.resolvePath(values.text(row.name)), "dump");
+        value = absolute.format(row.name);
+      }
+      const std::string unit = row.unit.empty() ? "" : fmt::format(" [{}]", row.unit);
+      if (values.given(row.name) || m_purpose == DumpPurpose::hash)
+        m_text += fmt::format("{} = {}\n", row.name, value);
+      else
+        defaults += fmt::format("# {} = {}  # {}{}\n", row.name, value, row.help, unit);
+    }
+    m_text += defaults;
+  }
+
+  const SceneFile& m_scene;
+  DumpPurpose m_purpose;
+  std::string m_text;
+};
+
+}  // namespace
+
+std::string SceneFile::resolvePath(const std::string& written) const {
+  if (written.empty()) return written;
+  const std::filesystem::path p(written);
+  return p.is_absolute() ? written : (folder / p).lexically_normal().string();
+}
+
+bool SceneFile::framesSmoke() const {
+  return !camera.given("position") && !camera.given("matrix");
+}
+
+std::string SceneFile::hash() const {
+  Hasher hasher;
+  hasher.text(Dumper(*this, DumpPurpose::hash).text());
+  return hasher.hex();
+}
+
+SceneFile parseScene(const std::string& text, const std::string& name,
+                     const std::filesystem::path& folder, const std::vector<std::string>& sets) {
+  const TomlText toml = parseToml(text, name, sets);
+  SceneFile scene;
+  scene.folder = folder;
+  SceneReader(toml, scene).read();
+  return scene;
+}
+
+SceneFile loadScene(const std::filesystem::path& path, const std::vector<std::string>& sets) {
+  std::ifstream in(path, std::ios::binary);
+  std::ostringstream text;
+  if (std::filesystem::is_directory(path))
+    throw InputMissingError(path.string(), "is a folder, not a scene file");
+  if (!in) throw InputMissingError(path.string(), "cannot be opened");
+  if (in.peek() != std::ifstream::traits_type::eof()) text << in.rdbuf();
+  if (!in.good() && !in.eof()) throw InputMissingError(path.string(), "cannot be read");
+  const std::filesystem::path folder = std::filesystem::absolute(path).parent_path();
+  SceneFile scene = parseScene(text.str(), path.string(), folder, sets);
+  scene.path = path.string();
+  return scene;
+}
+
+std::string dumpScene(const SceneFile& scene) {
+  return Dumper(scene, DumpPurpose::file).text();
+}
+
+}  // namespace photosphere::scene

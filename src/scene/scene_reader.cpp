@@ -1,0 +1,354 @@
+#include "scene_reader.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+#include "photosphere/cameras/camera.h"
+#include "photosphere/core/error.h"
+#include "photosphere/core/frames.h"
+#include "photosphere/core/registry.h"
+#include "photosphere/lights/light.h"
+#include "photosphere/phase/phase.h"
+
+namespace photosphere::scene {
+
+namespace {
+
+// What the contract names and this version lacks. A name that a plug-in table serves leaves these
+// lists without effect.
+constexpr std::string_view kContractCameras[] = {"perspective", "orthographic", "equirectangular"};
+constexpr std::string_view kContractLights[] = {"point", "spot",   "directional", "rect",
+                                                "disk",  "sphere", "environment"};
+constexpr std::string_view kContractPhases[] = {
+    "isotropic", "henyey_greenstein", "double_henyey_greenstein", "rayleigh", "draine", "mie_fog"};
+constexpr std::string_view kContractLightKeys[] = {"size", "radius", "file"};
+
+[[noreturn]] void notServed(const std::string& place, std::string_view what) {
+  throw ConfigError(fmt::format("{}: {} is not served by this version yet", place, what));
+}
+
+// The plug-in of a name, told apart from names that are only promised.
+template <class Plugin>
+const Plugin& choose(std::span<const Plugin* const> plugins, std::string_view name,
+                     std::string_view kind, std::span<const std::string_view> contract,
+                     const std::string& place) {
+  const auto names = pluginNames(plugins);
+  if (std::find(names.begin(), names.end(), name) == names.end() &&
+      std::find(contract.begin(), contract.end(), name) != contract.end())
+    throw ConfigError(fmt::format("{}: {} '{}' is not served by this version yet (served: {})",
+                                  place, kind, name, fmt::join(names, ", ")));
+  return findPlugin(plugins, name, kind, place);
+}
+
+std::string textOf(const toml::node& node, std::string_view key, const std::string& place) {
+  const auto* text = node.as_string();
+  if (!text) throw ConfigError(fmt::format("{}: '{}' must be text", place, key));
+  return text->get();
+}
+
+ParamValue arrayValue(const toml::array& array, std::string_view key, const std::string& place) {
+  if (!array.empty() && array.front().is_table())
+    notServed(place, fmt::format("'{}' with keys over time (an array of tables)", key));
+  std::vector<double> numbers;
+  std::vector<std::string> texts;
+  for (const toml::node& item : array) {
+    if (const auto number = item.value<double>(); number && item.is_number())
+      numbers.push_back(*number);
+    else if (const auto* text = item.as_string())
+      texts.push_back(text->get());
+    else
+      throw ConfigError(fmt::format("{}: '{}' must hold numbers or text alone", place, key));
+  }
+  if (!numbers.empty() && !texts.empty())
+    throw ConfigError(fmt::format("{}: '{}' mixes numbers and text", place, key));
+  if (!texts.empty()) return texts;
+  return numbers;
+}
+
+ParamValue valueOf(const toml::node& node, std::string_view key, const std::string& place) {
+  if (const auto* flag = node.as_boolean()) return flag->get();
+  if (const auto* integer = node.as_integer()) return integer->get();
+  if (const auto* real = node.as_floating_point()) return real->get();
+  if (const auto* text = node.as_string()) return text->get();
+  if (const auto* array = node.as_array()) return arrayValue(*array, key, place);
+  throw ConfigError(
+      fmt::format("{}: '{}' must be a plain value, not a table or a date", place, key));
+}
+
+// "24000/1001" as a number; plain numbers as they are.
+ParamValue frameRate(ParamValue value, const std::string& place) {
+  const auto* text = std::get_if<std::string>(&value);
+  if (!text) return value;
+  double numerator = 0, denominator = 0;
+  int used = 0;
+  if (std::sscanf(text->c_str(), "%lf/%lf%n", &numerator, &denominator, &used) == 2 &&
+      used == static_cast<int>(text->size()) && denominator > 0)
+    return numerator / denominator;
+  throw ConfigError(fmt::format(
+      "{}: 'fps' = '{}' is neither a number nor a ratio such as \"24000/1001\"", place, *text));
+}
+
+bool hasRow(const ParamValues& values, std::string_view key) {
+  return std::any_of(values.rows().begin(), values.rows().end(),
+                     [&](const Param& p) { return p.name == key; });
+}
+
+// A key that belongs to another plug-in of the kind deserves a better message than "unknown".
+template <class Plugin>
+void explainForeignKey(std::span<const Plugin* const> plugins, std::string_view key,
+                       std::string_view kind, std::string_view type, const std::string& place) {
+  std::vector<std::string_view> owners;
+  for (const Plugin* plugin : plugins)
+    for (const Param& row : plugin->params)
+      if (row.name == key) owners.push_back(plugin->name);
+  if (!owners.empty())
+    throw ConfigError(fmt::format("{}: '{}' is an option of {} {}, not of {}", place, key, kind,
+                                  fmt::join(owners, ", "), type));
+}
+
+}  // namespace
+
+std::vector<Param> joinRows(std::span<const Param> common, std::span<const Param> own) {
+  std::vector<Param> rows(common.begin(), common.end());
+  rows.insert(rows.end(), own.begin(), own.end());
+  return rows;
+}
+
+const toml::table* SceneReader::table(const std::string& name) const {
+  const toml::node* node = m_text.root.get(name);
+  if (!node) return nullptr;
+  if (!node->is_table())
+    throw ConfigError(fmt::format("{}: must be a table, `[{}]`", where(*node, name, name), name));
+  return node->as_table();
+}
+
+const toml::array* SceneReader::tables(const std::string& name) const {
+  const toml::node* node = m_text.root.get(name);
+  if (!node) return nullptr;
+  const toml::array* array = node->as_array();
+  const bool good = array && std::all_of(array->cbegin(), array->cend(),
+                                         [](const toml::node& item) { return item.is_table(); });
+  if (!good)
+    throw ConfigError(fmt::format("{}: every {} begins with `[[{}]]`, in double brackets",
+                                  where(*node, name, name), name, name));
+  return array;
+}
+
+void SceneReader::readPlain(const std::string& name, ParamValues& values) const {
+  const toml::table* from = table(name);
+  if (!from) return;
+  for (const auto& [key, node] : *from) {
+    const std::string k(key.str());
+    const std::string place = where(node, name + "." + k, name);
+    values.set(k, hasRow(values, k) ? valueOf(node, k, place) : ParamValue(), place);
+  }
+}
+
+void SceneReader::readScene() {
+  const toml::table* from = table("scene");
+  if (!from) return;
+  for (const auto& [key, node] : *from) {
+    const std::string k(key.str());
+    const std::string place = where(node, "scene." + k, "scene");
+    ParamValue value = hasRow(m_scene.scene, k) ? valueOf(node, k, place) : ParamValue();
+    if (k == "fps") value = frameRate(value, place);
+    // A single frame may be written as a number.
+    if (const auto* one = std::get_if<std::int64_t>(&value); k == "frames" && one)
+      value = std::to_string(*one);
+    m_scene.scene.set(k, value, place);
+    if (k == "frames" && !m_scene.scene.text(k).empty()) {
+      try {
+        parseFrames(m_scene.scene.text(k));
+      } catch (const ConfigError& error) {
+        throw ConfigError(fmt::format("{}: {}", place, error.what()));
+      }
+    }
+  }
+}
+
+void SceneReader::readCamera() {
+  const toml::table* from = table("camera");
+  const toml::node* type = from ? from->get("type") : nullptr;
+  const std::string place =
+      from ? where(*from, "camera", "camera") : fmt::format("{}: [camera]", m_text.name);
+  m_scene.cameraWhere = place;
+  if (type) m_scene.cameraType = textOf(*type, "type", where(*type, "camera.type", "camera"));
+  const cameras::CameraPlugin& plugin =
+      choose(cameras::cameraModels(), m_scene.cameraType, "camera type",
+             std::span<const std::string_view>(kContractCameras),
+             type ? where(*type, "camera.type", "camera") : place);
+  m_scene.camera = ParamValues(joinRows(cameras::cameraParams(), plugin.params));
+  if (!from) return;
+  for (const auto& [key, node] : *from) {
+    const std::string k(key.str());
+    if (k == "type") continue;
+    const std::string at = where(node, "camera." + k, "camera");
+    if (!hasRow(m_scene.camera, k))
+      explainForeignKey(cameras::cameraModels(), k, "camera type", m_scene.cameraType, at);
+    m_scene.camera.set(k, hasRow(m_scene.camera, k) ? valueOf(node, k, at) : ParamValue(), at);
+    if (k == "resolution" && m_scene.camera.vec2(k) != glm::floor(m_scene.camera.vec2(k)))
+      throw ConfigError(fmt::format("{}: 'resolution' must be two whole numbers", at));
+  }
+}
+
+void SceneReader::readAlbedo(const toml::node& node, const std::string& place,
+                             VolumeEntry& entry) const {
+  if (!node.is_string()) {
+    entry.values.set("albedo", valueOf(node, "albedo", place), place);
+    return;
+  }
+  entry.albedoGrid = textOf(node, "albedo", place);
+  if (entry.albedoGrid.empty())
+    throw ConfigError(
+        fmt::format("{}: 'albedo' must be a number, [r, g, b] or the name of a grid", place));
+}
+
+void SceneReader::readPhase(const toml::node& node, const std::string& path,
+                            VolumeEntry& entry) const {
+  const std::string place = where(node, path, path);
+  const toml::table* from = node.as_table();
+  if (!from)
+    throw ConfigError(fmt::format(
+        "{}: 'phase' must be a table such as {{ type = \"henyey_greenstein\", g = 0.4 }}", place));
+  if (const toml::node* type = from->get("type"))
+    entry.phase = textOf(*type, "type", where(*type, path + ".type", path));
+  const phase::PhasePlugin& plugin =
+      choose(phase::phaseFunctions(), entry.phase, "phase function",
+             std::span<const std::string_view>(kContractPhases), place);
+  entry.phaseValues = ParamValues(plugin.params);
+  for (const auto& [key, value] : *from) {
+    const std::string k(key.str());
+    if (k == "type") continue;
+    const std::string at = where(value, path + "." + k, path);
+    if (!hasRow(entry.phaseValues, k))
+      explainForeignKey(phase::phaseFunctions(), k, "phase function", entry.phase, at);
+    entry.phaseValues.set(k, hasRow(entry.phaseValues, k) ? valueOf(value, k, at) : ParamValue(),
+                          at);
+  }
+  try {
+    plugin.create(entry.phaseValues);
+  } catch (const ConfigError& error) {
+    throw ConfigError(fmt::format("{}: {}", place, error.what()));
+  }
+}
+
+void SceneReader::readVolume(const toml::table& from, std::size_t index) {
+  const std::string path = fmt::format("volume.{}", index);
+  VolumeEntry entry;
+  entry.where = where(from, path, path);
+  entry.values = ParamValues(volumeParams());
+  entry.phaseValues =
+      ParamValues(findPlugin(phase::phaseFunctions(), entry.phase, "phase", entry.where).params);
+  for (const auto& [key, node] : from) {
+    const std::string k(key.str());
+    const std::string place = where(node, path + "." + k, path);
+    if (k == "phase") {
+      readPhase(node, path + ".phase", entry);
+    } else if (k == "albedo") {
+      readAlbedo(node, place, entry);
+    } else if (k == "emission") {
+      notServed(place, "'emission'");
+    } else {
+      entry.values.set(k, hasRow(entry.values, k) ? valueOf(node, k, place) : ParamValue(), place);
+    }
+    if (k == "density_scale") {
+      const Vec3d scale = entry.values.vec3(k);
+      if (scale.x != scale.y || scale.y != scale.z)
+        notServed(place, "'density_scale' with unequal channels (coloured extinction)");
+    }
+  }
+  if (entry.values.text("file").empty())
+    throw ConfigError(
+        fmt::format("{}: 'file' is missing: every volume names its cache", entry.where));
+  m_scene.volumes.push_back(std::move(entry));
+}
+
+void SceneReader::readLight(const toml::table& from, std::size_t index) {
+  const std::string path = fmt::format("light.{}", index);
+  LightEntry entry;
+  entry.where = where(from, path, path);
+  const toml::node* type = from.get("type");
+  if (!type)
+    throw ConfigError(fmt::format("{}: 'type' is missing (known: {})", entry.where,
+                                  fmt::join(pluginNames(lights::lightModels()), ", ")));
+  const std::string typePlace = where(*type, path + ".type", path);
+  entry.type = textOf(*type, "type", typePlace);
+  const lights::LightPlugin& plugin =
+      choose(lights::lightModels(), entry.type, "light type",
+             std::span<const std::string_view>(kContractLights), typePlace);
+  entry.values = ParamValues(joinRows(lights::lightParams(), plugin.params));
+  for (const auto& [key, node] : from) {
+    const std::string k(key.str());
+    if (k == "type") continue;
+    const std::string place = where(node, path + "." + k, path);
+    if (!hasRow(entry.values, k)) {
+      explainForeignKey(lights::lightModels(), k, "light type", entry.type, place);
+      for (const std::string_view contract : kContractLightKeys)
+        if (k == contract) notServed(place, fmt::format("'{}'", k));
+    }
+    entry.values.set(k, hasRow(entry.values, k) ? valueOf(node, k, place) : ParamValue(), place);
+  }
+  m_scene.lights.push_back(std::move(entry));
+}
+
+void SceneReader::read() {
+  constexpr std::string_view known[] = {"scene",     "camera",  "volume", "light",
+                                        "estimator", "effects", "render", "output"};
+  for (const auto& [key, node] : m_text.root) {
+    const std::string k(key.str());
+    if (std::find(std::begin(known), std::end(known), k) == std::end(known))
+      throw ConfigError(fmt::format("{}: unknown {}{} (known: {})", where(node, k, k),
+                                    node.is_table() ? "table" : "key", suggestion(k, known),
+                                    fmt::join(known, ", ")));
+  }
+  m_scene.scene = ParamValues(sceneParams());
+  m_scene.estimator = ParamValues(estimatorParams());
+  m_scene.effects = ParamValues(effectsParams());
+  m_scene.render = ParamValues(renderParams());
+  m_scene.output = ParamValues(outputParams());
+  readScene();
+  readCamera();
+  if (const toml::array* volumes = tables("volume"))
+    for (std::size_t i = 0; i < volumes->size(); ++i)
+      readVolume(*volumes->get(i)->as_table(), i);
+  if (const toml::array* lights = tables("light"))
+    for (std::size_t i = 0; i < lights->size(); ++i)
+      readLight(*lights->get(i)->as_table(), i);
+  readPlain("estimator", m_scene.estimator);
+  readPlain("effects", m_scene.effects);
+  readPlain("render", m_scene.render);
+  readPlain("output", m_scene.output);
+  checkCombinations(m_scene, m_text.name);
+}
+
+void checkCombinations(const SceneFile& scene, const std::string& name) {
+  const ParamValues& e = scene.estimator;
+  const std::string place = name + ": [estimator]";
+  const bool particles = e.text("carrier") == "particles";
+  const bool collisions = e.text("deposit") == "collision";
+  if (e.text("energy") == "scatter" && !(particles && collisions))
+    throw ConfigError(place +
+                      ": energy = \"scatter\" needs carrier = \"particles\" and deposit = "
+                      "\"collision\"; other carriers hold no energy to share out");
+  if (e.real("deposit_radius") > 0 && !(particles && collisions))
+    throw ConfigError(place +
+                      ": 'deposit_radius' needs carrier = \"particles\" and deposit = "
+                      "\"collision\"; elsewhere use 'radius'");
+  if (!e.text("cache").empty() && e.text("type") != "photosphere")
+    throw ConfigError(
+        fmt::format("{}: 'cache' needs type = \"photosphere\", not \"{}\"", place, e.text("type")));
+  if (!e.text("cache").empty() && e.text("basis") == "view")
+    throw ConfigError(place +
+                      ": basis = \"view\" holds light for one camera and is never cached; leave "
+                      "'basis' at auto with a 'cache'");
+  const double limit = scene.render.real("memory_limit");
+  if (limit < 0 && limit != -1)
+    throw ConfigError(name +
+                      ": [render]: 'memory_limit' must be -1 (none), 0 (85 % of what is "
+                      "free) or a number of GiB");
+}
+
+}  // namespace photosphere::scene

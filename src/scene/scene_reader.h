@@ -1,0 +1,40 @@
+#pragma once
+// Tables of a parsed scene file into option values.
+
+#include "photosphere/scene/scene_file.h"
+#include "toml_text.h"
+
+namespace photosphere::scene {
+
+/// Option rows in one list, the plug-in's after those common to its kind.
+std::vector<Param> joinRows(std::span<const Param> common, std::span<const Param> own);
+
+class SceneReader {
+ public:
+  SceneReader(const TomlText& text, SceneFile& scene) : m_text(text), m_scene(scene) {}
+  /// @throws ConfigError
+  void read();
+
+ private:
+  std::string where(const toml::node& node, const std::string& dotted,
+                    const std::string& table) const {
+    return m_text.where(node, dotted, table);
+  }
+  const toml::table* table(const std::string& name) const;
+  const toml::array* tables(const std::string& name) const;
+  void readPlain(const std::string& name, ParamValues& values) const;
+  void readScene();
+  void readCamera();
+  void readVolume(const toml::table& from, std::size_t index);
+  void readAlbedo(const toml::node& node, const std::string& place, VolumeEntry& entry) const;
+  void readPhase(const toml::node& node, const std::string& path, VolumeEntry& entry) const;
+  void readLight(const toml::table& from, std::size_t index);
+
+  const TomlText& m_text;
+  SceneFile& m_scene;
+};
+
+/// Refuses what METHOD.md section 4 does not allow together. @throws ConfigError
+void checkCombinations(const SceneFile& scene, const std::string& name);
+
+}  // namespace photosphere::scene

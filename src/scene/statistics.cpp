@@ -1,0 +1,50 @@
+// --stats as JSON.
+
+#include <nlohmann/json.hpp>
+
+#include "photosphere/core/version.h"
+#include "photosphere/scene/pipeline.h"
+
+namespace photosphere::scene {
+
+namespace {
+
+// The library writes numbers that are not finite as null.
+nlohmann::ordered_json channels(const Vec3d& v) {
+  return {v.x, v.y, v.z};
+}
+
+}  // namespace
+
+std::string statsJson(const FrameStatistics& s) {
+  nlohmann::ordered_json json;
+  json["seconds"] = {{"read", s.seconds.read},   {"rasterize", s.seconds.rasterize},
+                     {"trace", s.seconds.trace}, {"resolve", s.seconds.resolve},
+                     {"march", s.seconds.march}, {"write", s.seconds.write},
+                     {"total", s.seconds.total}};
+  json["cpu_seconds"] = s.cpuSeconds;
+  json["peak_memory_bytes"] = s.peakMemoryBytes;
+  json["photons"] = {{"emitted", s.photonsEmitted},
+                     {"scattered", s.photonsScattered},
+                     {"stored", s.photonsStored},
+                     {"capped", s.photonsCapped}};
+  json["energy_watts"] = {
+      {"emitted", channels(s.energyEmitted)},   {"missed", channels(s.energyMissed)},
+      {"absorbed", channels(s.energyAbsorbed)}, {"escaped", channels(s.energyEscaped)},
+      {"capped", channels(s.energyCapped)},     {"error", channels(s.energyError)}};
+  json["nan_samples"] = s.nanSamples;
+  json["negative_samples"] = s.negativeSamples;
+  json["majorant_violations"] = s.majorantViolations;
+  if (s.pathsCapped > 0)
+    json["paths_capped"] = {{"count", s.pathsCapped}, {"throughput", s.pathsCappedRadiance}};
+  json["effects"] = nlohmann::ordered_json::object();
+  for (const EffectState& effect : s.effects)
+    json["effects"][effect.name] = {{"on", effect.on}, {"why", effect.why}, {"bound", nullptr}};
+  json["image"] = {{"mean", s.imageMean}, {"max", s.imageMax}};
+  json["version"] = versionText();
+  json["scene_hash"] = s.sceneHash;
+  // Names come from files and need not be UTF-8.
+  return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace photosphere::scene

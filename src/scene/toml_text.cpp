@@ -1,0 +1,120 @@
+#include "toml_text.h"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <optional>
+
+#include "photosphere/core/error.h"
+
+namespace photosphere::scene {
+
+namespace {
+
+std::vector<std::string> segments(const std::string& path) {
+  std::vector<std::string> parts(1);
+  for (const char c : path) {
+    if (c == '.')
+      parts.emplace_back();
+    else
+      parts.back() += c;
+  }
+  return parts;
+}
+
+std::optional<std::size_t> indexOf(const std::string& segment) {
+  std::size_t index = 0;
+  const auto [end, error] = std::from_chars(segment.data(), segment.data() + segment.size(), index);
+  if (error != std::errc() || end != segment.data() + segment.size()) return std::nullopt;
+  return index;
+}
+
+// The value as TOML; text that is not TOML stands for itself.
+toml::table valueTable(const std::string& text) {
+  try {
+    toml::table parsed = toml::parse("value = " + text);
+    const toml::node* value = parsed.get("value");
+    const bool usable = value && parsed.size() == 1 && !value->is_date() && !value->is_time() &&
+                        !value->is_date_time();
+    if (usable) return parsed;
+  } catch (const toml::parse_error&) {
+    // Not TOML: a path or a name without quotes.
+  }
+  return toml::table{{"value", text}};
+}
+
+// The child of a table or array, created where the path goes on but the file does not.
+toml::node& descend(toml::node& at, const std::string& segment, const std::string& next,
+                    const std::string& set) {
+  if (toml::table* table = at.as_table()) {
+    if (!table->contains(segment)) {
+      if (indexOf(next))
+        table->insert(segment, toml::array{});
+      else
+        table->insert(segment, toml::table{});
+    }
+    return *table->get(segment);
+  }
+  if (toml::array* array = at.as_array()) {
+    const auto index = indexOf(segment);
+    if (index && *index == array->size()) array->push_back(toml::table{});
+    if (index && *index < array->size()) return *array->get(*index);
+    throw ConfigError(
+        fmt::format("--set {}: '{}' must be an index from 0 to {}", set, segment, array->size()));
+  }
+  throw ConfigError(fmt::format("--set {}: nothing lies below a plain value ('{}')", set, segment));
+}
+
+void applySet(toml::table& root, const std::string& set, TomlText& out) {
+  const std::size_t equals = set.find('=');
+  const std::string path = set.substr(0, equals);
+  if (equals == std::string::npos || path.empty())
+    throw ConfigError(fmt::format("--set {}: must be dotted.path=value", set));
+  const std::vector<std::string> parts = segments(path);
+  toml::node* at = &root;
+  for (std::size_t i = 0; i + 1 < parts.size(); ++i)
+    at = &descend(*at, parts[i], parts[i + 1], set);
+  toml::table value = valueTable(set.substr(equals + 1));
+  toml::node& node = *value.get("value");
+  if (toml::table* table = at->as_table()) {
+    node.visit([&](auto& typed) { table->insert_or_assign(parts.back(), std::move(typed)); });
+  } else if (toml::array* array = at->as_array()) {
+    const auto index = indexOf(parts.back());
+    if (!index || *index >= array->size())
+      throw ConfigError(fmt::format("--set {}: '{}' must be an index below {}", set, parts.back(),
+                                    array->size()));
+    node.visit([&](auto& typed) {
+      array->replace(array->cbegin() + static_cast<std::ptrdiff_t>(*index), std::move(typed));
+    });
+  } else {
+    throw ConfigError(fmt::format("--set {}: nothing lies below a plain value", set));
+  }
+  out.sets[path] = set;
+}
+
+}  // namespace
+
+std::string TomlText::where(const toml::node& node, const std::string& dotted,
+                            const std::string& table) const {
+  const auto place = sets.find(dotted);
+  if (place != sets.end()) return fmt::format("--set {}: [{}]", place->second, table);
+  if (node.source().begin.line == 0) return fmt::format("{}: [{}]", name, table);
+  return fmt::format("{}:{}: [{}]", name, node.source().begin.line, table);
+}
+
+TomlText parseToml(const std::string& text, const std::string& name,
+                   const std::vector<std::string>& sets) {
+  TomlText out;
+  out.name = name;
+  try {
+    out.root = toml::parse(text, name);
+  } catch (const toml::parse_error& error) {
+    throw ConfigError(fmt::format("{}:{}:{}: not valid TOML: {}", name, error.source().begin.line,
+                                  error.source().begin.column, error.description()));
+  }
+  for (const std::string& set : sets)
+    applySet(out.root, set, out);
+  return out;
+}
+
+}  // namespace photosphere::scene

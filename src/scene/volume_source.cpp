@@ -1,0 +1,179 @@
+#include "volume_source.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "photosphere/caches/cache_format.h"
+#include "photosphere/core/error.h"
+#include "photosphere/core/frames.h"
+#include "photosphere/core/log.h"
+#include "photosphere/core/resources.h"
+#include "photosphere/volume/rasterize.h"
+#include "photosphere/volume/vdb_file.h"
+
+namespace photosphere::scene {
+
+using volume::Grid;
+using volume::GridKind;
+
+namespace {
+
+Mat4d translation(const Vec3d& offset) {
+  Mat4d m(1.0);
+  m[3] = glm::dvec4(offset, 1.0);
+  return m;
+}
+
+const Grid& findGrid(const CacheGrids& cache, std::string_view key, const std::string& name) {
+  const Grid* found = nullptr;
+  for (const Grid& grid : cache.grids) {
+    if (grid.name() != name) continue;
+    if (found)
+      throw InputError(cache.path,
+                       fmt::format("several grids are named '{}'; rename all but one", name));
+    found = &grid;
+  }
+  if (found) return *found;
+  const std::string points =
+      cache.pointGrids.empty()
+          ? ""
+          : " and points, which only carry light where a file has grids (remove the grids to "
+            "rasterize the points)";
+  throw InputError(cache.path,
+                   fmt::format("no grid is named '{}' (the file has {}{}); set volume.{} to one of "
+                               "them",
+                               name, cache.listing(), points, key));
+}
+
+void checkAffine(const std::string& path, const Grid& grid) {
+  if (grid.isAffine()) return;
+  throw InputError(path, fmt::format("grid '{}' has a frustum transform, which no renderer of "
+                                     "straight voxels can place; resample it to a linear transform "
+                                     "(Houdini: VDB Resample) first",
+                                     grid.name()));
+}
+
+// One set of all particles of a file; the attributes of the first system decide when there are
+// several.
+volume::ParticleSet pointsOf(const CacheGrids& cache) {
+  if (cache.pointGrids.size() > 1)
+    throw InputError(
+        cache.path, fmt::format("holds {} point grids and no density; `photosphere convert` merges "
+                                "them into one",
+                                cache.pointGrids.size()));
+  return volume::gridToPoints(cache.pointGrids.front());
+}
+
+Grid rasterized(const CacheGrids& cache, const VolumeEntry& entry, VolumeSource& source) {
+  const Stopwatch watch;
+  volume::RasterizeOptions options;
+  options.radius = entry.values.real("particle_radius");
+  const volume::ParticleSet points = pointsOf(cache);
+  if (points.size() == 0) return {};
+  const volume::RasterizeResult result = volume::rasterize(points, options);
+  source.notes.push_back(
+      fmt::format("{}: {} points rasterized at voxel edge {:.4g}, radius {:.4g} to {:.4g}{}",
+                  cache.path, points.size(), result.voxelSize, result.radiusMin, result.radiusMax,
+                  result.radiusFromSpacing ? " (from their spacing; they have no pscale)" : ""));
+  source.rasterizeSeconds = watch.seconds();
+  return result.density;
+}
+
+void checkAlbedo(const std::string& path, const Grid& grid) {
+  const double most = grid.kind() == GridKind::vector ? std::sqrt(3.0) : 1.0;
+  const volume::GridStatistics found = volume::statistics(grid);
+  if (grid.activeVoxels() > 0 && (found.max > most * 1.0001 || found.min < 0))
+    throw InputError(path, fmt::format("grid '{}' is used as albedo but holds {:.4g} to {:.4g}; an "
+                                       "albedo lies in [0, 1]",
+                                       grid.name(), found.min, found.max));
+}
+
+}  // namespace
+
+std::string CacheGrids::listing() const {
+  std::vector<std::string> names;
+  for (const Grid& grid : grids)
+    names.push_back(fmt::format("'{}' ({})", grid.name(), grid.valueType()));
+  return names.empty() ? "no grids" : fmt::format("{}", fmt::join(names, ", "));
+}
+
+CacheGrids readCacheGrids(const std::string& path) {
+  CacheGrids out;
+  out.path = path;
+  if (caches::detectFormat(path).name == "vdb") {
+    volume::VdbFile file = volume::readVdb(path);
+    for (Grid& grid : file.grids)
+      (grid.kind() == GridKind::points ? out.pointGrids : out.grids).push_back(std::move(grid));
+    return out;
+  }
+  caches::CacheContent content = caches::readCache(path);
+  out.grids = std::move(content.grids);
+  out.notes = std::move(content.notes);
+  for (const volume::ParticleSet& set : content.particles)
+    if (set.size() > 0) out.pointGrids.push_back(volume::pointsToGrid(set, "points", 0));
+  return out;
+}
+
+Mat4d VolumeSource::worldFromIndex(const Grid& grid) const {
+  return worldFromFile * grid.worldFromIndex() * translation(indexShift);
+}
+
+Box3d VolumeSource::bounds() const {
+  Box3d box;
+  const Box3i active = density ? density.activeBounds() : Box3i();
+  if (active.empty()) return box;
+  const Mat4d m = worldFromIndex(density);
+  // Interpolation reaches one voxel beyond the active ones.
+  for (int corner = 0; corner < 8; ++corner)
+    box.grow(transformPoint(m, Vec3d(corner & 1 ? active.max.x + 1 : active.min.x - 1,
+                                     corner & 2 ? active.max.y + 1 : active.min.y - 1,
+                                     corner & 4 ? active.max.z + 1 : active.min.z - 1)));
+  return box;
+}
+
+VolumeSource readVolume(const SceneFile& scene, const VolumeEntry& entry, std::int64_t frame,
+                        bool wantParticles) {
+  VolumeSource source;
+  source.path = framePath(scene.resolvePath(entry.values.text("file")), frame);
+  source.worldFromFile =
+      entry.values.matrix("transform") * translation(entry.values.vec3("origin"));
+  const Mat4d& m = source.worldFromFile;
+  if (m[0][3] != 0 || m[1][3] != 0 || m[2][3] != 0 || m[3][3] != 1 ||
+      !(std::abs(glm::determinant(Mat3d(m))) > 1e-30))
+    throw ConfigError(
+        fmt::format("{}: 'transform' must be affine and invertible: row-major, its "
+                    "last row 0, 0, 0, 1",
+                    entry.where));
+
+  const Stopwatch watch;
+  const CacheGrids cache = readCacheGrids(source.path);
+  source.notes = cache.notes;
+  source.readSeconds = watch.seconds();
+  if (cache.grids.empty() && cache.pointGrids.empty())
+    throw InputError(source.path, "holds neither grids nor points");
+  if (cache.grids.empty()) {
+    source.density = rasterized(cache, entry, source);
+  } else {
+    source.density = findGrid(cache, "density", entry.values.text("density"));
+    if (source.density.kind() != GridKind::scalar)
+      throw InputError(source.path,
+                       fmt::format("grid '{}' is of type {}; a density is one number a voxel",
+                                   source.density.name(), source.density.valueType()));
+    // A rasterized grid has its values at its nodes already.
+    if (entry.values.flag("cell_centered")) source.indexShift = Vec3d(0.5);
+  }
+  if (source.density) checkAffine(source.path, source.density);
+  if (!entry.albedoGrid.empty()) {
+    source.albedo = findGrid(cache, "albedo", entry.albedoGrid);
+    checkAffine(source.path, source.albedo);
+    checkAlbedo(source.path, source.albedo);
+  }
+  if (wantParticles)
+    for (const Grid& grid : cache.pointGrids)
+      for (const Vec3d& p : volume::gridToPoints(grid).positions)
+        source.particles.push_back(transformPoint(source.worldFromFile, p));
+  return source;
+}
+
+}  // namespace photosphere::scene
