@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <new>
 
@@ -12,6 +13,7 @@
 #include "photosphere/core/interrupt.h"
 #include "photosphere/core/log.h"
 #include "photosphere/core/output_file.h"
+#include "photosphere/core/registry.h"
 #include "photosphere/core/version.h"
 
 namespace photosphere::cli {
@@ -23,7 +25,17 @@ constexpr const char* kExitCodes =
     "5 over the memory budget; 6 output error; 7 comparison target missed; 8 some frames failed;\n"
     "75 interrupted after a checkpoint, run again; 130, 143 ended by a signal.";
 
+/// The parser would only say that a command is missing.
+void checkCommandName(int argc, char** argv) {
+  if (argc < 2 || argv[1][0] == '-') return;
+  const auto names = pluginNames(commands());
+  if (std::find(names.begin(), names.end(), std::string_view(argv[1])) == names.end())
+    throw ConfigError(fmt::format("unknown command '{}'{} (known: {})", argv[1],
+                                  suggestion(argv[1], names), fmt::join(names, ", ")));
+}
+
 int parseAndRun(int argc, char** argv) {
+  checkCommandName(argc, argv);
   CLI::App app("Renders light that is scattered many times in smoke.", "photosphere");
   app.set_version_flag("--version", versionText());
   app.require_subcommand(1);

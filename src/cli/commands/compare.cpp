@@ -160,8 +160,8 @@ int runCompare(const Options& options) {
 
 std::function<int()> declareCompare(CLI::App& app) {
   auto options = std::make_shared<Options>();
-  app.add_option("image", options->image, "Image to judge")->type_name("A.exr")->required();
-  app.add_option("reference", options->reference, "Image that is right")
+  app.add_option("IMAGE", options->image, "Image to judge")->type_name("A.exr")->required();
+  app.add_option("REFERENCE", options->reference, "Image that is right")
       ->type_name("B.exr")
       ->required();
   app.add_option("--second-reference", options->secondReference,

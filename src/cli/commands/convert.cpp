@@ -105,9 +105,9 @@ int runConvert(Options& options) {
 std::function<int()> declareConvert(CLI::App& app) {
   auto options = std::make_shared<Options>();
   ConvertOptions& convert = options->convert;
-  app.add_option("inputs", options->inputs,
+  app.add_option("IN", options->inputs,
                  "Files of one frame, or patterns such as smoke.####.vdb; several are put together")
-      ->type_name("IN")
+      ->type_name("FILE")
       ->required();
   app.add_option("-o,--output", options->output,
                  "File to write (.vdb .ply .csv .prt), with #### "

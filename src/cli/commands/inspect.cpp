@@ -58,8 +58,8 @@ int runInspect(const Options& options) {
 
 std::function<int()> declareInspect(CLI::App& app) {
   auto options = std::make_shared<Options>();
-  app.add_option("files", options->files, "Cache files, or patterns such as smoke.####.vdb")
-      ->type_name("FILE")
+  app.add_option("FILE", options->files, "Cache files, or patterns such as smoke.####.vdb")
+      ->type_name("")
       ->required();
   app.add_flag("--json", options->json, "One JSON object a file, or an array of them");
   return [options] { return runInspect(*options); };

@@ -3,65 +3,28 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <array>
 #include <memory>
 
 #include "command.h"
-#include "photosphere/caches/cache_format.h"
-#include "photosphere/cameras/camera.h"
 #include "photosphere/core/error.h"
-#include "photosphere/lights/light.h"
-#include "photosphere/phase/phase.h"
+#include "photosphere/core/param.h"
+#include "plugin_text.h"
 #include "print.h"
 
 namespace photosphere::cli::plugins {
 
 namespace {
 
-template <class Plugin>
-std::string listTable(std::span<const Plugin* const> table) {
-  std::string text;
-  for (const Plugin* plugin : table)
-    text +=
-        fmt::format("  {}: {}\n{}", plugin->name, plugin->help, formatParams(plugin->params, 6));
-  return text;
-}
-
-std::string listFormats() {
-  std::string text;
-  for (const caches::CacheFormat* format : caches::cacheFormats())
-    text += fmt::format("  {}: {} ({}; {})\n{}", format->name, format->help,
-                        fmt::join(format->extensions, " "),
-                        !format->write  ? "read"
-                        : !format->read ? "written"
-                                        : "read and written",
-                        formatParams(format->params, 6));
-  return text;
-}
-
-std::string listPhases() {
-  return listTable(phase::phaseFunctions());
-}
-
-std::string listLights() {
-  return "  options of every light\n" + formatParams(lights::lightParams(), 6) +
-         listTable(lights::lightModels());
-}
-
-std::string listCameras() {
-  return "  options of every camera\n" + formatParams(cameras::cameraParams(), 6) +
-         listTable(cameras::cameraModels());
-}
-
 struct Kind {
   std::string_view name;
-  std::string (*list)();
+  std::string (*describe)();
 };
 constexpr std::array kKinds = {
-    Kind{"formats", listFormats},
-    Kind{"phases", listPhases},
-    Kind{"lights", listLights},
-    Kind{"cameras", listCameras},
+    Kind{"formats", describeFormats},       Kind{"phases", describePhases},
+    Kind{"lights", describeLights},         Kind{"cameras", describeCameras},
+    Kind{"estimators", describeEstimators}, Kind{"scene", describeScene},
 };
 
 int runList(const std::vector<std::string>& wanted) {
@@ -75,7 +38,7 @@ int runList(const std::vector<std::string>& wanted) {
   for (const Kind& kind : kKinds) {
     if (!wanted.empty() && std::find(wanted.begin(), wanted.end(), kind.name) == wanted.end())
       continue;
-    std::string text = kind.list();
+    std::string text = kind.describe();
     if (!text.empty()) text.pop_back();
     printLine("{}\n{}", kind.name, text);
   }
@@ -87,7 +50,7 @@ std::function<int()> declareList(CLI::App& app) {
   std::string kinds;
   for (const Kind& kind : kKinds)
     kinds += fmt::format("{}{}", kinds.empty() ? "" : ", ", kind.name);
-  app.add_option("kinds", *wanted, "Only these: " + kinds)->type_name("KIND");
+  app.add_option("KIND", *wanted, "Only these: " + kinds)->type_name("");
   return [wanted] { return runList(*wanted); };
 }
 

@@ -1,0 +1,149 @@
+// photosphere render: frames of a scene, or of a bare cache.
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <memory>
+
+#include "command.h"
+#include "frame_loop.h"
+#include "photosphere/core/error.h"
+#include "photosphere/core/log.h"
+#include "photosphere/core/resources.h"
+#include "photosphere/image/exr.h"
+#include "photosphere/scene/pipeline.h"
+#include "plugin_text.h"
+#include "print.h"
+#include "scene_options.h"
+#include "stats_file.h"
+
+namespace photosphere::cli::plugins {
+
+namespace {
+
+struct Options {
+  SceneOptions scene;
+  std::string output, crop, compression = "zip";
+  scene::WriteRequest write;
+};
+
+/// -o, else output.file. @throws ConfigError
+std::string chooseOutput(const scene::SceneFile& scene, const std::string& option) {
+  const std::string path = option.empty() ? scene.resolvePath(scene.output.text("file")) : option;
+  if (path.empty())
+    throw ConfigError("no output; give -o beauty.####.exr, or output.file in the scene");
+  if (std::filesystem::path(path).extension() != ".exr")
+    throw ConfigError(fmt::format("{}: frames are written as .exr; --preview writes PNG", path));
+  return path;
+}
+
+std::optional<render::Crop> parseCrop(const std::string& text) {
+  if (text.empty()) return std::nullopt;
+  const auto c = parseInts("--crop", text, ',', 4, "X0,Y0,X1,Y1 in pixels, X1 and Y1 exclusive");
+  const render::Crop crop{{c[0], c[1]}, {c[2], c[3]}};
+  if (crop.max.x <= crop.min.x || crop.max.y <= crop.min.y)
+    throw ConfigError(fmt::format("command line: --crop '{}' is empty", text));
+  return crop;
+}
+
+void renderOne(const scene::SceneFile& scene, std::int64_t frame, const Options& options,
+               const scene::RenderRequest& request, StatsFile& stats) {
+  scene::FrameResult result = scene::renderScene(scene, frame, request);
+  for (const std::string& note : result.notes)
+    log::info("frame {}: {}", frame, note);
+  scene::writeFrame(result, scene, options.write);
+  const scene::FrameStatistics& s = result.statistics;
+  const std::string path = framePath(options.write.path, frame);
+  printLine("frame {}: {}  mean {:.6g}, max {:.6g}  {}  peak {}", frame, path, s.imageMean,
+            s.imageMax, formatSeconds(s.seconds), formatBytes(s.peakMemoryBytes));
+  stats.add(frame, path, s);
+}
+
+int renderFrames(const scene::SceneFile& scene, const Options& options) {
+  const std::vector<std::int64_t> frames = sceneFrameList(scene, options.scene);
+  checkOutputPattern(options.write.path, frames.size());
+  if (!options.write.preview.empty()) checkOutputPattern(options.write.preview, frames.size());
+  const CacheFrames cacheFrames(scene, options.scene);
+  scene::SceneFile empty = scene;
+  empty.volumes.clear();
+  StatsFile stats(options.scene.stats, frames.size());
+  bool planned = false;
+  return runFrames(frames, options.scene.frames.keepGoing, [&](std::int64_t frame) {
+    const std::string path = framePath(options.write.path, frame);
+    if (options.scene.frames.skipExisting && image::exrIsComplete(path))
+      return printLine("frame {}: {} exists and is complete, skipped", frame, path);
+    scene::RenderRequest request;
+    request.crop = parseCrop(options.crop);
+    request.allowStale = options.scene.allowStale;
+    std::int64_t cacheFrame = frame;
+    const bool smoke = cacheFrames.map(frame, cacheFrame);
+    if (cacheFrame != frame) request.cacheFrame = cacheFrame;
+    if (!options.scene.frames.dryRun)
+      return renderOne(smoke ? scene : empty, frame, options, request, stats);
+    if (smoke && !std::exchange(planned, true)) printPlan(scene, frame, request, false);
+    printLine("frame {}: {} from frame {} of the caches", frame, path, cacheFrame);
+  });
+}
+
+int runRender(Options& options) {
+  parseCrop(options.crop);
+  options.write.compression = image::parseExrCompression(options.compression);
+  const scene::SceneFile scene = openScene(options.scene);
+  if (options.scene.dumpScene) {
+    printLine("{}", scene::dumpScene(scene));
+    return static_cast<int>(ExitCode::ok);
+  }
+  options.write.path = chooseOutput(scene, options.output);
+  if (options.write.preview.empty())
+    options.write.preview = scene.resolvePath(scene.output.text("preview"));
+  return renderFrames(scene, options);
+}
+
+std::string sceneHelp() {
+  return "Keys of a scene file, which -s/--set overrides:\n" + describeScene() +
+         describeEstimators() + "\nCameras:\n" + describeCameras() + "\nLights:\n" +
+         describeLights() + "\nPhase functions:\n" + describePhases();
+}
+
+std::function<int()> declareRender(CLI::App& app) {
+  auto options = std::make_shared<Options>();
+  app.add_option("-o,--output", options->output, "EXR to write, with #### for several frames")
+      ->type_name("OUT.exr");
+  addSceneOptions(app, options->scene);
+  const char* group = "Image";
+  app.add_option("--crop", options->crop, "Part of the frame in pixels, X1 and Y1 exclusive")
+      ->type_name("X0,Y0,X1,Y1")
+      ->group(group);
+  app.add_flag("--float", options->write.floatColor, "Colour as 32-bit float; else half")
+      ->group(group);
+  app.add_option("--compression", options->compression,
+                 "none, rle, zips, zip, piz, dwaa, dwab [zip]")
+      ->type_name("NAME")
+      ->group(group);
+  app.add_option("--preview", options->write.preview, "PNG or JPEG for people beside the EXR")
+      ->type_name("OUT.png")
+      ->group(group);
+  app.add_option("--exposure", options->write.exposure, "Of the preview, in stops [0]")
+      ->type_name("STOPS")
+      ->group(group);
+  app.add_option("--ocio", options->write.ocioConfig,
+                 "OpenColorIO config [$OCIO, else the one shipped]")
+      ->type_name("FILE")
+      ->group(group);
+  app.add_option("--ocio-display", options->write.ocioDisplay, "Display of the preview")
+      ->type_name("NAME")
+      ->group(group);
+  app.add_option("--ocio-view", options->write.ocioView, "View of the preview")
+      ->type_name("NAME")
+      ->group(group);
+  app.footer([] { return sceneHelp(); });
+  return [options] { return runRender(*options); };
+}
+
+}  // namespace
+
+extern const Command render;
+const Command render = {
+    "render", "Render frames of a scene, or of a cache for which one is made up", declareRender};
+
+}  // namespace photosphere::cli::plugins

@@ -1,0 +1,181 @@
+#include "scene_options.h"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <array>
+#include <filesystem>
+
+#include "photosphere/core/error.h"
+#include "photosphere/core/log.h"
+#include "photosphere/core/resources.h"
+#include "print.h"
+
+namespace photosphere::cli {
+
+namespace {
+
+struct NamedHold {
+  std::string_view name;
+  CacheHold hold;
+};
+constexpr std::array kHolds = {
+    NamedHold{"clip", CacheHold::clip}, NamedHold{"extend", CacheHold::extend},
+    NamedHold{"repeat", CacheHold::repeat}, NamedHold{"pingpong", CacheHold::pingpong}};
+
+void addScenePaths(CLI::App& app, SceneOptions& options) {
+  app.add_option("SCENE", options.scene, "Scene (.toml), or a cache for which one is made up")
+      ->type_name("FILE")
+      ->required();
+  app.add_option("-s,--set", options.sets,
+                 "Override a key of the scene, such as volume.0.density_scale=4; repeatable")
+      ->type_name("KEY=VALUE")
+      ->allow_extra_args(false);
+  app.add_option("--seed", options.seed, "Replaces scene.seed")->type_name("N");
+  app.add_option("--res", options.resolution, "Replaces camera.resolution")->type_name("WxH");
+  app.add_option("--colorspace", options.colorspace, "Replaces output.colorspace")
+      ->type_name("NAME");
+  app.add_flag("--dump-scene", options.dumpScene,
+               "Print the scene as TOML with every key, and do nothing");
+}
+
+/// The first volume whose file is numbered; empty when there is none.
+std::string numberedCache(const scene::SceneFile& scene) {
+  for (const scene::VolumeEntry& volume : scene.volumes) {
+    std::string path = scene.resolvePath(volume.values.text("file"));
+    if (hasFrameToken(path)) return path;
+  }
+  return {};
+}
+
+std::vector<std::int64_t> findCacheFrames(const std::string& pattern) {
+  std::vector<std::int64_t> frames = findFrames(pattern);
+  if (frames.empty())
+    throw InputMissingError(pattern, "no file matches; check the path and its number of #");
+  return frames;
+}
+
+void refuseUnserved(const SceneOptions& options) {
+  if (!options.resume.empty() && options.resume != "never")
+    throw ConfigError("--resume is not served by this version yet; start again without it");
+  if (!options.shard.empty())
+    throw ConfigError("--shard is not served by this version yet; trace in one process");
+}
+
+}  // namespace
+
+void addSceneOptions(CLI::App& app, SceneOptions& options) {
+  addScenePaths(app, options);
+  app.add_option("--stats", options.stats,
+                 "Statistics as JSON: an object a frame with #### in the path, else an array when "
+                 "there are several frames")
+      ->type_name("FILE.json");
+  app.add_flag("--allow-stale", options.allowStale,
+               "Use a light cache that was made for another medium or other lights");
+  app.add_option("--resume", options.resume, "auto, never or require (not served yet)")
+      ->check(CLI::IsMember(std::vector<std::string>{"auto", "never", "require"}).description(""))
+      ->type_name("WHEN");
+  app.add_option("--cache-offset", options.cacheOffset,
+                 "Frame of the caches minus frame of the picture [0]")
+      ->type_name("N")
+      ->group("Frames");
+  std::vector<std::string> names;
+  for (const NamedHold& hold : kHolds)
+    names.emplace_back(hold.name);
+  app.add_option("--cache-hold", options.cacheHold,
+                 "Outside the caches' frames: clip (no smoke), extend, repeat, pingpong [an error]")
+      ->type_name("HOW")
+      ->check(CLI::IsMember(names).description(""))
+      ->group("Frames");
+  addFrameOptions(app, options.frames);
+}
+
+scene::SceneFile openScene(const SceneOptions& options) {
+  refuseUnserved(options);
+  std::vector<std::string> sets = options.sets;
+  for (const std::string& text : sets)
+    parseAssignment("--set", text);
+  // After -s: the option that is more explicit wins.
+  if (!options.resolution.empty()) {
+    const auto size = parseInts("--res", options.resolution, 'x', 2, "WxH, such as 1280x720");
+    sets.push_back(fmt::format("camera.resolution=[{}, {}]", size[0], size[1]));
+  }
+  if (options.seed) sets.push_back(fmt::format("scene.seed={}", *options.seed));
+  const std::filesystem::path path(options.scene);
+  scene::SceneFile scene = path.extension() == ".toml" ? scene::loadScene(path, sets)
+                                                       : scene::sceneForVolume(path, sets);
+  if (!options.colorspace.empty())
+    scene.output.set("colorspace", options.colorspace, "--colorspace");
+  for (const std::string& choice : scene.choices)
+    log::info("{}", choice);
+  return scene;
+}
+
+std::vector<std::int64_t> sceneFrameList(const scene::SceneFile& scene,
+                                         const SceneOptions& options) {
+  if (!options.frames.frames.empty()) return parseFrames(options.frames.frames);
+  if (!scene.scene.text("frames").empty()) return scene::sceneFrames(scene);
+  const std::string pattern = numberedCache(scene);
+  if (pattern.empty()) return {1};
+  std::vector<std::int64_t> frames = findCacheFrames(pattern);
+  for (std::int64_t& frame : frames)
+    frame -= options.cacheOffset;
+  return frames;
+}
+
+CacheFrames::CacheFrames(const scene::SceneFile& scene, const SceneOptions& options)
+    : m_offset(options.cacheOffset) {
+  for (const NamedHold& known : kHolds)
+    if (known.name == options.cacheHold) m_hold = known.hold;
+  if (!m_hold) return;
+  const std::string pattern = numberedCache(scene);
+  if (pattern.empty()) {
+    m_hold.reset();  // one file for all frames: there is no outside
+    return;
+  }
+  const auto frames = findCacheFrames(pattern);
+  m_first = frames.front();
+  m_last = frames.back();
+}
+
+bool CacheFrames::map(std::int64_t frame, std::int64_t& cacheFrame) const {
+  cacheFrame = frame + m_offset;
+  return !m_hold || mapFrame(cacheFrame, m_first, m_last, *m_hold, cacheFrame);
+}
+
+void printPlan(const scene::SceneFile& scene, std::int64_t frame,
+               const scene::RenderRequest& request, bool forLightCache) {
+  scene::SetupOptions options;
+  options.cacheFrame = request.cacheFrame;
+  options.forLightCache = forLightCache;
+  const scene::FrameSetup setup = scene::setUpFrame(scene, frame, options);
+  const std::string type = scene.estimator.text("type");
+  printLine("frame {}: {} x {} pixels, estimator {}, smoke {}", frame, setup.camera->resolution().x,
+            setup.camera->resolution().y, type, formatBox(setup.worldBounds));
+  for (const scene::EffectState& effect : setup.effectStates)
+    printLine("  {:<20} {:<4} {}", effect.name, effect.on ? "on" : "off", effect.why);
+  const bool lightField = type == "photosphere" && setup.effects.multipleScattering;
+  if (lightField)
+    printLine("  light field          {}", formatBytes(scene::predictedLightFieldBytes(setup)));
+  if (setup.memoryBudget > 0)
+    printLine("  memory budget        {}", formatBytes(setup.memoryBudget));
+  for (const std::string& note : setup.notes)
+    log::info("{}", note);
+  scene::checkMemory(setup, lightField);
+}
+
+std::string formatSeconds(const scene::StageSeconds& seconds) {
+  std::string text;
+  auto add = [&](const char* name, double value) {
+    if (value >= 0.005) text += fmt::format("{} {:.2f}, ", name, value);
+  };
+  add("read", seconds.read);
+  add("rasterize", seconds.rasterize);
+  add("trace", seconds.trace);
+  add("resolve", seconds.resolve);
+  add("march", seconds.march);
+  add("write", seconds.write);
+  return text + fmt::format("total {:.2f} s", seconds.total);
+}
+
+}  // namespace photosphere::cli
