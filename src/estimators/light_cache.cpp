@@ -115,7 +115,7 @@ Metadata describe(const LightField& field, const LightCacheKey& key) {
   m["rows"] = std::to_string(l.rows);
   m["channels"] = std::to_string(l.channels);
   m["phases"] = std::to_string(l.phases);
-  m["unscattered"] = l.unscattered ? "1" : "0";
+  m["unscattered"] = std::string(1, l.unscattered ? '1' : '0');
   m["light_voxel"] = exact(l.lightVoxel);
   m["radius_m"] = exact(l.radius);
   m["deposit_radius_m"] = exact(l.depositRadius);
