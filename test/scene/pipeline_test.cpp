@@ -108,7 +108,10 @@ TEST_F(PipelineTest, TwoOverlappingVolumesAddUp) {
                                       "density_scale = 1.5\nphase = { g = 0.3 }\n"),
                         {"volume.0.density_scale=1.5"}),
                   1);
-  EXPECT_LT(relativeDifference(once, twice), 0.03);
+  // Two volumes draw other random numbers than one: compare what noise averages out of.
+  EXPECT_NEAR(meanOf(twice.layers.transmittance), meanOf(once.layers.transmittance), 1e-5);
+  EXPECT_NEAR(meanOf(twice.layers.single) / meanOf(once.layers.single), 1.0, 1e-3);
+  EXPECT_NEAR(meanOf(twice.layers.multiple) / meanOf(once.layers.multiple), 1.0, 0.02);
 }
 
 TEST_F(PipelineTest, AMissingGridListsWhatIsThere) {
@@ -191,8 +194,8 @@ TEST_F(PipelineTest, EffectsSwitchLayersOff) {
 
 TEST_F(PipelineTest, PhotosphereAgreesWithPathTracing) {
   const std::string text = ballScene(ball("p.vdb"), Vec3d(0), 1);
-  const FrameResult fast =
-      renderScene(scene(text, {"estimator.photons=100000", "render.samples=8"}), 1);
+  const FrameResult fast = renderScene(
+      scene(text, {"estimator.photons=100000", "render.samples=8", "estimator.light_voxel=1"}), 1);
   const FrameResult truth =
       renderScene(scene(text, {"estimator.type=path_traced", "estimator.samples=128"}), 1);
   EXPECT_NEAR(meanOf(fast.layers.single) / meanOf(truth.layers.single), 1.0, 0.03);
@@ -265,10 +268,37 @@ TEST_F(PipelineTest, CarriersHaveTheOrderOfAPointGrid) {
   }
 }
 
+TEST_F(PipelineTest, ALightCacheStandsForTracing) {
+  const std::string text = ballScene(ball("l.vdb"), Vec3d(0), 1);
+  const std::string cache = (m_folder / "light.####.vdb").string();
+  const FrameStatistics traced = traceScene(scene(text), 3, cache);
+  EXPECT_EQ(traced.photonsEmitted, 20000u);
+  EXPECT_TRUE(std::filesystem::exists(m_folder / "light.0003.vdb"));
+  const FrameResult direct = renderScene(scene(text, {"estimator.basis=histogram"}), 3);
+  const FrameResult cached = renderScene(scene(text, {"estimator.cache=" + cache}), 3);
+  EXPECT_LT(relativeDifference(direct, cached), 1e-5);
+  EXPECT_EQ(cached.statistics.photonsEmitted, 20000u);
+  EXPECT_EQ(cached.statistics.seconds.trace, 0.0);
+  // Another camera may use it; another lamp or another smoke may not.
+  EXPECT_EQ(complaint([&] {
+              renderScene(scene(text, {"estimator.cache=" + cache, "camera.fov=40"}), 3);
+            }),
+            "");
+  for (const char* change : {"light.0.intensity=5", "volume.0.density_scale=2"}) {
+    const SceneFile stale = scene(text, {"estimator.cache=" + cache, change});
+    EXPECT_NE(complaint([&] { renderScene(stale, 3); }, ExitCode::inputInvalid), "") << change;
+    RenderRequest request;
+    request.allowStale = true;
+    EXPECT_EQ(complaint([&] { renderScene(stale, 3, request); }), "") << change;
+  }
+  EXPECT_NE(complaint([&] { traceScene(scene(text, {"estimator.basis=view"}), 3, cache); }), "");
+  EXPECT_NE(complaint([&] { traceScene(scene(text, {"estimator.type=single"}), 3, cache); }), "");
+}
+
 TEST_F(PipelineTest, TooLittleMemoryIsRefusedBeforeTheWork) {
   const std::string text = ballScene(ball("b.vdb"), Vec3d(0), 1);
   const std::string message = complaint(
-      [&] { renderScene(scene(text, {"render.memory_limit=0.001"}), 1); }, ExitCode::memory);
+      [&] { renderScene(scene(text, {"render.memory_limit=0.0002"}), 1); }, ExitCode::memory);
   EXPECT_TRUE(contains(message, "estimator.light_voxel")) << message;
   EXPECT_TRUE(contains(message, "render.memory_limit")) << message;
   // The histogram alone passes a budget that the view basis meets.
