@@ -1,7 +1,11 @@
 #include "light_stage.h"
 
-#include "photosphere/core/error.h"
+#include <fmt/format.h>
+
+#include "photosphere/core/frames.h"
+#include "photosphere/core/hash.h"
 #include "photosphere/core/resources.h"
+#include "photosphere/estimators/light_cache.h"
 
 namespace photosphere::scene {
 
@@ -24,13 +28,61 @@ void report(const transport::TraceStatistics& traced, const estimators::LightFie
   s.energyError = traced.imbalance();
 }
 
+// What light in the cache came from: every lamp but its name, in local space.
+std::string lightHash(const SceneFile& scene) {
+  Hasher hasher;
+  for (const LightEntry& light : scene.lights) {
+    if (light.type == "environment" && scene.effects.text("environment") == "off") continue;
+    hasher.text(light.type);
+    for (const Param& row : light.values.rows())
+      if (row.name != "name") {
+        hasher.text(row.name);
+        hasher.text(light.values.format(row.name));
+      }
+  }
+  hasher.number(scene.scene.real("meters_per_unit"));
+  return hasher.hex();
+}
+
+estimators::LightCacheKey cacheKey(const SceneFile& scene, const FrameSetup& setup) {
+  return {setup.medium->hash(), lightHash(scene), setup.space};
+}
+
+// Keys that decided what a cache holds act no more once it is read.
+void noteIdleKeys(const SceneFile& scene, FrameSetup& setup) {
+  std::vector<std::string_view> idle;
+  for (const std::string_view key :
+       {"photons", "radius", "deposit_radius", "spatial_kernel", "carrier", "basis", "deposit",
+        "rows", "energy", "light_voxel"})
+    if (scene.estimator.given(key)) idle.push_back(key);
+  if (!idle.empty())
+    setup.notes.push_back(
+        fmt::format("estimator.cache decides what was stored; {} in the scene {} not act (trace "
+                    "again to change "
+                    "that)",
+                    fmt::join(idle, ", "), idle.size() == 1 ? "does" : "do"));
+}
+
+estimators::LightField readField(const SceneFile& scene, bool allowStale, FrameSetup& setup,
+                                 FrameStatistics& statistics) {
+  const Stopwatch watch;
+  const std::string path = framePath(scene.resolvePath(scene.estimator.text("cache")), setup.frame);
+  estimators::LightField field =
+      estimators::readLightCache(path, cacheKey(scene, setup), allowStale);
+  setup.layout = field.layout;
+  noteIdleKeys(scene, setup);
+  statistics.photonsEmitted = field.photons;
+  statistics.seconds.read += watch.seconds();
+  return field;
+}
+
 }  // namespace
 
-estimators::LightField lightField(const SceneFile& scene, const RenderRequest&, FrameSetup& setup,
-                                  FrameStatistics& statistics) {
-  const Stopwatch watch;
+estimators::LightField lightField(const SceneFile& scene, const RenderRequest& request,
+                                  FrameSetup& setup, FrameStatistics& statistics) {
   if (!scene.estimator.text("cache").empty())
-    throw ConfigError("[estimator]: 'cache' is not served by this version yet");
+    return readField(scene, request.allowStale, setup, statistics);
+  const Stopwatch watch;
   transport::TraceOptions options;
   options.photons = static_cast<std::uint64_t>(scene.estimator.integer("photons"));
   options.key = setup.key;
@@ -38,12 +90,17 @@ estimators::LightField lightField(const SceneFile& scene, const RenderRequest&, 
   estimators::LightField field = estimators::traceLightField(
       *setup.medium, setup.lights, setup.layout, setup.view, setup.particles, options, traced);
   report(traced, setup.layout, statistics);
+  if (field.farPhotons > 0)
+    setup.notes.push_back(fmt::format(
+        "{} photons met no particle within the deposit radius and went to the nearest one",
+        field.farPhotons));
   statistics.seconds.trace = watch.seconds();
   return field;
 }
 
-void storeLightField(const FrameSetup&, const estimators::LightField&, const std::string&) {
-  throw ConfigError("writing a light cache is not served by this version yet");
+void storeLightField(const SceneFile& scene, const FrameSetup& setup,
+                     const estimators::LightField& field, const std::string& path) {
+  estimators::writeLightCache(path, field, cacheKey(scene, setup));
 }
 
 }  // namespace photosphere::scene

@@ -12,7 +12,7 @@ estimators::LightField lightField(const SceneFile& scene, const RenderRequest& r
                                   FrameSetup& setup, FrameStatistics& statistics);
 
 /// Writes a light field with the hashes of what it was traced in. @throws OutputError
-void storeLightField(const FrameSetup& setup, const estimators::LightField& field,
-                     const std::string& path);
+void storeLightField(const SceneFile& scene, const FrameSetup& setup,
+                     const estimators::LightField& field, const std::string& path);
 
 }  // namespace photosphere::scene

@@ -38,7 +38,7 @@ render::Crop clippedCrop(const std::optional<render::Crop>& wished, const Vec2i&
   return crop;
 }
 
-// What a path tracer finds and the scene switched off.
+// What a path tracer or a light cache holds although the scene switched it off.
 void dropLayers(const Effects& effects, render::FrameLayers& layers) {
   if (effects.singleScattering && effects.multipleScattering) return;
   for (std::size_t i = 0; i < layers.beauty.size(); ++i) {
@@ -105,7 +105,7 @@ Light prepareLight(const SceneFile& scene, const RenderRequest& request, FrameSe
   Light light;
   const bool wanted =
       scene.estimator.text("type") == "photosphere" && setup.effects.multipleScattering;
-  checkMemory(setup, wanted);
+  checkMemory(setup, wanted && scene.estimator.text("cache").empty());
   if (!wanted) return light;
   const estimators::LightField field = lightField(scene, request, setup, result.statistics);
   result.layout = describe(setup);
@@ -147,7 +147,6 @@ void renderLayers(const SceneFile& scene, const RenderRequest& request, const Fr
     path.effects = setup.effects;
     const auto integrator = render::makePathIntegrator(*setup.medium, setup.lights, path);
     result.layers = render::renderFrame(*setup.camera, *integrator, options);
-    dropLayers(setup.effects, result.layers);
   } else {
     render::MarchOptions march;
     march.step = static_cast<float>(scene.render.real("step"));
@@ -162,6 +161,7 @@ void renderLayers(const SceneFile& scene, const RenderRequest& request, const Fr
         render::makeMarchIntegrator(*setup.medium, setup.lights, shadows, source, march);
     result.layers = render::renderFrame(*setup.camera, *integrator, options);
   }
+  dropLayers(setup.effects, result.layers);
   result.statistics.seconds.march = watch.seconds();
 }
 
@@ -251,7 +251,7 @@ FrameStatistics traceScene(const SceneFile& scene, std::int64_t frame, const std
   checkMemory(setup, true);
   const estimators::LightField field = lightField(scene, request, setup, statistics);
   const Stopwatch writing;
-  storeLightField(setup, field, framePath(output, frame));
+  storeLightField(scene, setup, field, framePath(output, frame));
   statistics.seconds.write = writing.seconds();
   statistics.effects = setup.effectStates;
   statistics.cpuSeconds = processCpuSeconds() - cpuBefore;
