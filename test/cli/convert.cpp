@@ -185,6 +185,16 @@ TEST_F(Convert, GoesRoundThroughEveryPointFormat) {
   expectSameParticles(set, last.particles.front(), 1e-5);
 }
 
+TEST_F(Convert, LeavesTheOldOutputWhenItFails) {
+  volume::writeVdb(m_folder / "good.vdb", {ballOfSmoke(0.1)});
+  volume::writeVdb(m_folder / "bad.vdb", {ballOfSmoke(0.2)});
+  truncate(m_folder / "bad.vdb");
+  ASSERT_EQ(convert({"good.vdb", "-o", "out.vdb"}).exitCode, 0);
+  const std::string before = readText(m_folder / "out.vdb");
+  EXPECT_EQ(convert({"bad.vdb", "-o", "out.vdb"}).exitCode, 4);
+  EXPECT_EQ(readText(m_folder / "out.vdb"), before);
+}
+
 class ConvertSequence : public Convert {
  protected:
   void SetUp() override {
