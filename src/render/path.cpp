@@ -39,17 +39,19 @@ class PathIntegrator final : public Integrator {
     RayRadiance result;
     Segment segment = transport::clipToMedium(m_medium, origin, direction,
                                               std::numeric_limits<double>::infinity());
-    result.transmittance =
-        segment.length > 0.0f
-            ? Rgb(transport::trackTransmittance(m_medium, segment.origin, segment.direction,
-                                                segment.length, rng, counters.tracking))
-            : Rgb(1.0f);
     Rgb throughput(1.0f);
     for (int scatterings = 0;; ++scatterings) {
-      const Collision hit = segment.length > 0.0f ? transport::sampleCollision(
-                                                        m_medium, segment.origin, segment.direction,
-                                                        segment.length, rng, counters.tracking)
-                                                  : Collision{};
+      Collision hit;
+      if (scatterings == 0 && segment.length > 0.0f) {
+        float transmittance = 1.0f;
+        hit = transport::sampleCollisionAndTransmittance(m_medium, segment.origin, segment.direction,
+                                                         segment.length, rng, counters.tracking,
+                                                         transmittance);
+        result.transmittance = Rgb(transmittance);
+      } else if (segment.length > 0.0f) {
+        hit = transport::sampleCollision(m_medium, segment.origin, segment.direction, segment.length,
+                                         rng, counters.tracking);
+      }
       if (!hit.happened()) {
         const Vec3f d = scatterings == 0 ? direction : segment.direction;
         addEscape(result, throughput, d, scatterings);
@@ -76,10 +78,8 @@ class PathIntegrator final : public Integrator {
         if (!(rng.uniform() < 0.999f)) return result;
         throughput *= 1.0f / 0.999f;
       }
-      segment = transport::clipToMedium(m_medium, Vec3d(p), event.direction,
-                                        std::numeric_limits<double>::infinity());
-      segment.direction = event.direction;
-      segment.begin = 0.0;
+      // From inside, the walk over the majorants ends where the medium does.
+      segment = {p, event.direction, kInfinity, 0.0};
     }
   }
 
@@ -119,13 +119,10 @@ class PathIntegrator final : public Integrator {
     const lights::Illumination in = light.illuminate(p, u);
     if (!(maxComponent(in.irradiance) > 0.0f)) return;
     const Rgb scattered = phaseAlbedo(p, in.direction, -d);
-    const Segment toLight = transport::clipToMedium(m_medium, Vec3d(p), -in.direction,
-                                                    static_cast<double>(in.distance));
-    const float transmittance =
-        toLight.length > 0.0f && m_options.effects.shadows
-            ? transport::trackTransmittance(m_medium, toLight.origin, toLight.direction,
-                                            toLight.length, rng, counters.tracking)
-            : 1.0f;
+    const float transmittance = m_options.effects.shadows
+                                    ? transport::trackTransmittance(m_medium, p, -in.direction,
+                                                                    in.distance, rng, counters.tracking)
+                                    : 1.0f;
     add(result,
         throughput * scattered * in.irradiance * (transmittance / static_cast<float>(probability)),
         scatterings + 1);

@@ -136,10 +136,7 @@ void follow(const Medium& medium, Flight flight, Rng& rng, Batch& batch, TraceSt
     }
     flight.origin = point;
     flight.direction = event.direction;
-    double t0 = 0.0, t1 = std::numeric_limits<double>::infinity();
-    clip(medium.bounds(), Vec3d(point), Vec3d(flight.direction), t0, t1);
-    flight.length = std::max(0.0f, static_cast<float>(t1));
-    if (!(flight.length < kInfinity)) flight.length = 0.0f;
+    flight.length = exitDistance(medium, point, flight.direction);
   }
 }
 

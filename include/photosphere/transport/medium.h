@@ -46,9 +46,11 @@ class Medium {
   /// @throws ConfigError when the volumes have more than kMaxPhases distinct phase functions
   explicit Medium(std::vector<MediumVolume> volumes);
 
-  /// sigma_t [1/m].
+  /// sigma_t [1/m]. Only for a medium with bounds: an empty one has no place to ask about.
   float extinction(const Vec3f& p) const {
-    float sum = 0.0f;
+    const Placed& first = m_placed.front();
+    float sum = first.scale * first.field->sample(first.nodeFromLocal(p));
+    if (m_placed.size() == 1) return sum;
     for (const Placed& v : m_placed)
       sum += v.scale * v.field->sample(v.nodeFromLocal(p));
     return sum;

@@ -78,32 +78,36 @@ class SupportLattice {
 template <class Visit>
 void SupportLattice::walk(const Vec3f& from, const Vec3f& d, float length,
                           const Visit& visit) const {
-  // Everything in voxel units: u(t) = start + d t, t in voxels.
+  // Everything in voxel units: u(t) = start + d t, t in voxels. One set of scalars per axis: a vector
+  // indexed at run time would live in memory.
   const Vec3f start = (from - m_originF) * m_inverseEdge;
   const float edge = static_cast<float>(m_edge);
   const float end = length * m_inverseEdge;
-  Vec3i cell(static_cast<int>(std::floor(start.x)), static_cast<int>(std::floor(start.y)),
-             static_cast<int>(std::floor(start.z)));
-  Vec3i step;
-  Vec3f next, delta;
-  for (int a = 0; a < 3; ++a) {
-    step[a] = d[a] > 0 ? 1 : -1;
-    const float inverse = 1.0f / d[a];
-    delta[a] = d[a] != 0 ? std::abs(inverse) : kInfinity;
-    next[a] = d[a] != 0
-                  ? glm::max(0.0f, (static_cast<float>(cell[a] + (d[a] > 0 ? 1 : 0)) - start[a]) *
-                                       inverse)
-                  : kInfinity;
-  }
+  struct Axis {
+    Axis(float s, float d) : cell(static_cast<int>(std::floor(s))), step(d > 0.0f ? 1 : -1) {
+      if (d == 0.0f) return;
+      const float inverse = 1.0f / d;
+      delta = std::abs(inverse);
+      next = glm::max(0.0f, (static_cast<float>(cell + (d > 0.0f ? 1 : 0)) - s) * inverse);
+    }
+    void pass() {
+      next += delta;
+      cell += step;
+    }
+    int cell, step;
+    float next = kInfinity, delta = 0.0f;
+  };
+  Axis x(start.x, d.x), y(start.y, d.y), z(start.z, d.z);
   float t = 0.0f;
   while (t < end) {
-    const int a = next.x < next.y ? (next.x < next.z ? 0 : 2) : (next.y < next.z ? 1 : 2);
-    const float exit = glm::min(next[a], end);
-    const std::int32_t n = number(cell);
+    const float exit = glm::min(end, glm::min(x.next, glm::min(y.next, z.next)));
+    const std::int32_t n = number({x.cell, y.cell, z.cell});
     if (n >= 0 && exit > t) visit(static_cast<std::size_t>(n), t * edge, (exit - t) * edge);
     t = exit;
-    next[a] += delta[a];
-    cell[a] += step[a];
+    if (x.next < y.next)
+      x.next < z.next ? x.pass() : z.pass();
+    else
+      y.next < z.next ? y.pass() : z.pass();
   }
 }
 

@@ -22,6 +22,15 @@ struct Segment {
 Segment clipToMedium(const Medium& medium, const Vec3d& origin, const Vec3f& direction,
                      double maxDistance);
 
+/// Distance from a point inside the medium's bounds to where a ray leaves them [m].
+inline float exitDistance(const Medium& medium, const Vec3f& p, const Vec3f& d) {
+  const Vec3f low(medium.bounds().min), high(medium.bounds().max);
+  float t = kInfinity;
+  for (int a = 0; a < 3; ++a)
+    if (d[a] != 0.0f) t = glm::min(t, ((d[a] > 0.0f ? high[a] : low[a]) - p[a]) / d[a]);
+  return glm::max(t, 0.0f);
+}
+
 /// How often the extinction exceeded its majorant. Counted, reported, never clamped away in
 /// silence.
 struct TrackingCounters {
@@ -61,6 +70,45 @@ inline Collision sampleCollision(const Medium& medium, const Vec3f& o, const Vec
     walk.advance();
   }
   return {};
+}
+
+/// The first real collision and, from the same tentative ones, the ratio-tracked transmittance of the
+/// whole ray: both unbiased, and correlated with each other.
+inline Collision sampleCollisionAndTransmittance(const Medium& medium, const Vec3f& o, const Vec3f& d,
+                                                 float length, Rng& rng, TrackingCounters& counters,
+                                                 float& transmittance) {
+  volume::MajorantGrid::Walk walk(medium.majorants(), o, d, 0.0f, length);
+  Collision first;
+  transmittance = 1.0f;
+  float tau = -fastLog(rng.uniformPositive());
+  for (; !walk.done(); walk.advance()) {
+    const float majorant = walk.majorant();
+    const float end = walk.end();
+    float t = walk.begin();
+    while (true) {
+      const float available = (end - t) * majorant;
+      if (!(tau < available)) {
+        tau -= available;
+        break;
+      }
+      t += tau / majorant;
+      const float sigma = medium.extinction(o + d * t);
+      ++counters.lookups;
+      if (sigma > majorant * 1.001f) ++counters.majorantViolations;
+      if (!first.happened() && rng.uniform() * majorant < sigma) first = {t, sigma};
+      transmittance *= glm::max(0.0f, 1.0f - sigma / majorant);
+      if (transmittance < 0.1f) {
+        if (!(rng.uniform() * 0.1f < transmittance)) {
+          transmittance = 0.0f;
+          if (first.happened()) return first;
+        } else {
+          transmittance = 0.1f;
+        }
+      }
+      tau = -fastLog(rng.uniformPositive());
+    }
+  }
+  return first;
 }
 
 /// Unbiased transmittance along a ray (ratio tracking, Novak et al. 2014), with roulette once it is

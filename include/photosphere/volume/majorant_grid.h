@@ -2,6 +2,8 @@
 // Upper bounds of extinction over a coarse lattice: what delta tracking draws against and what
 // marching skips empty space by.
 
+#include <algorithm>
+#include <cstddef>
 #include <span>
 #include <vector>
 
@@ -39,45 +41,59 @@ class MajorantGrid {
     /// @param o, d        local space; d unit
     /// @param t0, t1      part of the ray to walk, inside the bounds
     Walk(const MajorantGrid& grid, const Vec3f& o, const Vec3f& d, float t0, float t1)
-        : m_grid(&grid), m_t(t0), m_end(t1) {
+        : m_values(grid.m_values.data()), m_t(t0), m_end(t1) {
       const Vec3f p = (o + d * t0 - grid.m_origin) * grid.m_inverseCellSize;
-      for (int a = 0; a < 3; ++a) {
-        int cell = static_cast<int>(p[a]);
-        cell = std::clamp(cell, 0, grid.m_dims[a] - 1);
-        m_cell[a] = cell;
-        const float inverse = 1.0f / d[a];
-        m_step[a] = d[a] > 0 ? 1 : -1;
-        m_delta[a] = d[a] != 0 ? std::abs(grid.m_cellSize[a] * inverse) : kInfinity;
-        const float plane =
-            grid.m_origin[a] + static_cast<float>(cell + (d[a] > 0 ? 1 : 0)) * grid.m_cellSize[a];
-        m_next[a] = d[a] != 0 ? std::max(t0, (plane - o[a]) * inverse) : kInfinity;
-      }
-      m_index = grid.cellIndex(m_cell);
+      const Vec3i cell = glm::clamp(Vec3i(p), Vec3i(0), grid.m_dims - 1);
+      m_index = static_cast<std::ptrdiff_t>(grid.cellIndex(cell));
+      const auto row = static_cast<std::ptrdiff_t>(grid.m_dims.x);
+      m_x = Axis(grid, o.x, d.x, t0, cell.x, 0, 1);
+      m_y = Axis(grid, o.y, d.y, t0, cell.y, 1, row);
+      m_z = Axis(grid, o.z, d.z, t0, cell.z, 2, row * grid.m_dims.y);
     }
     bool done() const { return !(m_t < m_end); }
-    float majorant() const { return m_grid->m_values[m_index]; }
+    float majorant() const { return m_values[m_index]; }
     float begin() const { return m_t; }
     /// End of the current cell along the ray.
-    float end() const { return std::min(m_end, std::min(m_next.x, std::min(m_next.y, m_next.z))); }
+    float end() const { return std::min(m_end, std::min(m_x.next, std::min(m_y.next, m_z.next))); }
     void advance() {
-      const int a =
-          m_next.x < m_next.y ? (m_next.x < m_next.z ? 0 : 2) : (m_next.y < m_next.z ? 1 : 2);
-      m_t = m_next[a];
-      m_cell[a] += m_step[a];
-      if (m_cell[a] < 0 || m_cell[a] >= m_grid->m_dims[a]) {
-        m_t = m_end;
-        return;
-      }
-      m_next[a] += m_delta[a];
-      m_index = m_grid->cellIndex(m_cell);
+      if (m_x.next < m_y.next)
+        pass(m_x.next < m_z.next ? m_x : m_z);
+      else
+        pass(m_y.next < m_z.next ? m_y : m_z);
     }
 
    private:
-    const MajorantGrid* m_grid;
+    // Crossings of one axis' cell faces.
+    struct Axis {
+      Axis() = default;
+      Axis(const MajorantGrid& grid, float o, float d, float t0, int cell, int axis,
+           std::ptrdiff_t toNeighbour) {
+        if (d == 0.0f) return;
+        const float inverse = 1.0f / d;
+        const float size = grid.m_cellSize[axis];
+        const bool up = d > 0.0f;
+        delta = std::abs(size * inverse);
+        next = std::max(t0, (grid.m_origin[axis] + static_cast<float>(cell + (up ? 1 : 0)) * size - o) *
+                                inverse);
+        left = up ? grid.m_dims[axis] - 1 - cell : cell;
+        stride = up ? toNeighbour : -toNeighbour;
+      }
+      float next = kInfinity;     // distance of the next face
+      float delta = 0.0f;         // between faces
+      int left = 0;               // cells beyond this one
+      std::ptrdiff_t stride = 0;  // from a cell to the next in memory
+    };
+    // Written for each axis by itself: a vector indexed at run time would live in memory.
+    void pass(Axis& axis) {
+      m_t = axis.left-- > 0 ? axis.next : kInfinity;
+      axis.next += axis.delta;
+      m_index += m_t < kInfinity ? axis.stride : 0;
+    }
+
+    const float* m_values;
     float m_t, m_end;
-    Vec3i m_cell{0}, m_step{0};
-    Vec3f m_next{0.0f}, m_delta{0.0f};
-    std::size_t m_index = 0;
+    std::ptrdiff_t m_index = 0;
+    Axis m_x, m_y, m_z;
   };
 
  private:
