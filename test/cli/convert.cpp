@@ -163,6 +163,8 @@ TEST_F(Convert, MergesTheFilesOfAFrame) {
   EXPECT_NE(file.tryFind("flame"), nullptr);
   const ParticleSet set = volume::gridToPoints(file.find("points"));
   ASSERT_EQ(set.size(), 40u);
+  for (const char* name : {"age", "pscale", "id"})
+    ASSERT_NE(set.find(name), nullptr) << name;
   int withAge = 0, withRadius = 0;
   for (std::size_t i = 0; i < set.size(); ++i) {
     withAge += set.find("age")->number(i) == 2.5;
