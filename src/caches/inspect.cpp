@@ -8,7 +8,6 @@
 
 #include "columns.h"
 #include "inspect_warnings.h"
-#include "optical_depth.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/frames.h"
 #include "photosphere/volume/rasterize.h"
@@ -59,7 +58,7 @@ GridReport measureGrid(const volume::Grid& grid) {
   report.infinities = values.infinities;
   report.negatives = values.negatives;
   report.firstInvalid = values.firstInvalid;
-  if (!vector && isDensityName(report.name)) report.opticalDepth = measureOpticalDepth(grid);
+  if (!vector && isDensityName(report.name)) report.opticalDepth = volume::measureOpticalDepth(grid);
   const std::string name = lowered(report.name);
   if (vector && (name == "v" || name.find("vel") != name.npos) && report.voxelSize.x > 0)
     report.velocityVoxelsPerFrame =

@@ -49,7 +49,7 @@ Json gridJson(const GridReport& grid) {
     if (grid.nans + grid.infinities > 0) json["first_invalid"] = triple(grid.firstInvalid);
   }
   if (grid.opticalDepth) {
-    const OpticalDepth& depth = *grid.opticalDepth;
+    const volume::OpticalDepth& depth = *grid.opticalDepth;
     json["mean_free_path_voxels"] = number(depth.meanFreePathVoxels);
     json["optical_depth"] = {
         {"p5", number(depth.p5)}, {"p50", number(depth.median)}, {"p95", number(depth.p95)}};

@@ -36,7 +36,7 @@ void appendGrid(std::string& text, const GridReport& grid) {
         grid.type.starts_with("vec") ? "length" : "values", grid.min, grid.max, grid.mean,
         grid.nans, grid.infinities, grid.negatives);
   if (grid.opticalDepth) {
-    const OpticalDepth& depth = *grid.opticalDepth;
+    const volume::OpticalDepth& depth = *grid.opticalDepth;
     text += fmt::format(
         "    at density_scale 1: mean free path {:.3g} voxels; optical depth along axis "
         "rays 5 % {:.3g}, 50 % {:.3g}, 95 % {:.3g}\n",
@@ -44,7 +44,7 @@ void appendGrid(std::string& text, const GridReport& grid) {
     text += fmt::format(
         "    density_scale = {:.2g} makes it look like smoke (95 % of rays below optical "
         "depth {:.2g})\n",
-        depth.suggestedScale, kSmokeOpticalDepth);
+        depth.suggestedScale, volume::kSmokeOpticalDepth);
   }
   if (grid.velocityVoxelsPerFrame)
     text += fmt::format("    at 24 frames a second the fastest voxel moves {:.3g} voxels a frame\n",

@@ -1,6 +1,7 @@
 #include "photosphere/core/output_file.h"
 
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -73,8 +74,8 @@ OutputFile::OutputFile(const fs::path& target) : m_target(target) {
   if (access(folder.c_str(), W_OK) != 0)
     throw OutputError(target.string(), "cannot write in its folder: " + reason(errno));
   // Keeps the extension, by which some libraries choose the format.
-  m_temporary = folder / ("." + m_target.stem().string() + ".tmp-photosphere-" +
-                          std::to_string(getpid()) + m_target.extension().string());
+  m_temporary = folder / fmt::format(".{}.tmp-photosphere-{}{}", m_target.stem().string(), getpid(),
+                                     m_target.extension().string());
   m_slot = claimSlot(fs::absolute(m_temporary).string());
 }
 

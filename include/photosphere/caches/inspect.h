@@ -8,19 +8,9 @@
 
 #include "photosphere/caches/cache_format.h"
 #include "photosphere/core/types.h"
+#include "photosphere/volume/optical_depth.h"
 
 namespace photosphere::caches {
-
-/// Optical depths at density_scale 1 along axis-aligned rays that meet the smoke.
-struct OpticalDepth {
-  double p5 = 0, median = 0, p95 = 0;  ///< percentiles over the rays of all three axes
-  double meanFreePathVoxels = 0;       ///< 1 / mean density, weighted by density
-  double suggestedScale = 0;           ///< density_scale that brings p95 to kSmokeOpticalDepth
-};
-
-/// Optical depth through its thick parts at which smoke looks like smoke: it blocks 99 % of the
-/// light and still lets it scatter many times.
-inline constexpr double kSmokeOpticalDepth = 5;
 
 struct GridReport {
   std::string name, type, gridClass;
@@ -34,7 +24,7 @@ struct GridReport {
   double min = 0, max = 0, mean = 0;  ///< of lengths for a vector grid
   std::uint64_t nans = 0, infinities = 0, negatives = 0;
   Vec3i firstInvalid{0};                         ///< index of the first NaN or infinite voxel
-  std::optional<OpticalDepth> opticalDepth;      ///< of a density grid
+  std::optional<volume::OpticalDepth> opticalDepth;      ///< of a density grid
   std::optional<double> velocityVoxelsPerFrame;  ///< longest vector at 24 frames a second
 };
 

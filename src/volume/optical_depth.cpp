@@ -1,4 +1,4 @@
-#include "optical_depth.h"
+#include "photosphere/volume/optical_depth.h"
 
 #include <openvdb/openvdb.h>
 
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <vector>
 
-namespace photosphere::caches {
+namespace photosphere::volume {
 
 namespace {
 
@@ -70,7 +70,7 @@ double roundedToTwoDigits(double value) {
 }
 
 template <class GridType>
-std::optional<OpticalDepth> measure(const GridType& grid, const volume::Grid& handle) {
+std::optional<OpticalDepth> measure(const GridType& grid, const Grid& handle) {
   const Box3i bounds = handle.activeBounds();
   if (bounds.empty()) return std::nullopt;
   Columns columns[3] = {{bounds, 0}, {bounds, 1}, {bounds, 2}};
@@ -105,7 +105,7 @@ std::optional<OpticalDepth> measure(const GridType& grid, const volume::Grid& ha
 
 }  // namespace
 
-std::optional<OpticalDepth> measureOpticalDepth(const volume::Grid& grid) {
+std::optional<OpticalDepth> measureOpticalDepth(const Grid& grid) {
   if (!grid || !grid.isAffine()) return std::nullopt;
   if (grid.base()->isType<openvdb::FloatGrid>())
     return measure(static_cast<const openvdb::FloatGrid&>(*grid.base()), grid);
@@ -114,4 +114,4 @@ std::optional<OpticalDepth> measureOpticalDepth(const volume::Grid& grid) {
   return std::nullopt;
 }
 
-}  // namespace photosphere::caches
+}  // namespace photosphere::volume
