@@ -11,6 +11,7 @@
 #include "photosphere/scene/scene_file.h"
 #include "photosphere/transport/tracking.h"
 #include "photosphere/volume/vdb_file.h"
+#include "scene_reader.h"
 #include "volume_source.h"
 
 namespace photosphere::scene {
@@ -77,9 +78,15 @@ Vec3d chooseUp(const CacheGrids& cache, const Box3d& box, std::vector<std::strin
   for (const volume::Grid& grid : cache.grids)
     for (const auto& [key, value] : grid.metadata())
       all += key + "=" + value + "\n";
-  const bool blender = holds(all, "blender"), houdini = holds(all, "houdini");
+  // Blender's Mantaflow caches name no software, but no other writes these grids together.
+  const auto has = [&](std::string_view name) {
+    return std::any_of(cache.grids.begin(), cache.grids.end(),
+                       [&](const volume::Grid& grid) { return grid.name() == name; });
+  };
+  const bool houdini = holds(all, "houdini");
+  const bool blender = holds(all, "blender") || (has("density") && has("flame") && has("shadow"));
   if (blender != houdini) {
-    choices.push_back(blender ? "Z is up: the file was written by Blender."
+    choices.push_back(blender ? "Z is up: the file is a cache of Blender's."
                               : "Y is up: the file was written by Houdini.");
     return blender ? Vec3d(0, 0, 1) : Vec3d(0, 1, 0);
   }
@@ -138,17 +145,18 @@ double chooseScale(const transport::Medium& medium, std::vector<std::string>& ch
 }
 
 std::string vectorText(const Vec3d& v) {
-  return fmt::format("[{:.9g}, {:.9g}, {:.9g}]", v.x, v.y, v.z);
+  return fmt::format("[{:.12g}, {:.12g}, {:.12g}]", v.x, v.y, v.z);
 }
 
 // A spot above the camera's left shoulder, four radii away, whose cone just holds the smoke.
-std::string keyLight(const Box3d& box, const Vec3d& up, const Mat4d& camera,
+std::string keyLight(const Box3d& box, const Vec3d& up, const Mat4d& camera, double metersPerUnit,
                      std::vector<std::string>& choices) {
   const double radius = 0.5 * glm::length(box.extent());
   const Vec3d direction = glm::normalize(up - 0.9 * Vec3d(camera[0]) + 0.35 * Vec3d(camera[2]));
   const double distance = 4.0 * radius;
   const double angle = std::asin(1.0 / 4.0) * 180 / kPi * 1.2;
-  const double intensity = kIrradiance * distance * distance;  // I = E d^2
+  const double meters = distance * metersPerUnit;
+  const double intensity = kIrradiance * meters * meters;  // I = E d^2
   choices.push_back(fmt::format(
       "Key light: a spot from above and the left, {:.4g} away; its intensity of {:.4g} W/sr gives "
       "the centre an irradiance of 2 pi W/m^2, which exposes smoke of this albedo well.",
@@ -159,18 +167,11 @@ std::string keyLight(const Box3d& box, const Vec3d& up, const Mat4d& camera,
       vectorText(box.center() + direction * distance), vectorText(box.center()), intensity, angle);
 }
 
-std::string quoted(const std::string& text) {
-  static constexpr Param row = {.name = "text", .type = ParamType::text};
-  ParamValues values(std::span<const Param>(&row, 1));
-  values.set("text", text, "scene");
-  return values.format("text");
-}
-
 std::string volumeText(const std::string& file, const std::string& density, double scale) {
   return fmt::format(
       "[[volume]]\nfile = {}\ndensity = {}\ndensity_scale = {:g}\nalbedo = {:g}\nphase = {{ type = "
       "\"henyey_greenstein\", g = {:g} }}\n\n",
-      quoted(file), quoted(density), scale, kAlbedo, kAnisotropy);
+      tomlText(file), tomlText(density), scale, kAlbedo, kAnisotropy);
 }
 
 // The overrides that decide what the smoke is, which everything else is chosen from.
@@ -230,7 +231,7 @@ SceneFile sceneForVolume(const std::filesystem::path& path, const std::vector<st
   choices.push_back(
       "The camera frames the smoke from the front, a little from the right and above.");
   text += volumeText(pattern, density, scale);
-  text += keyLight(smoke.worldBounds, up, camera, choices);
+  text += keyLight(smoke.worldBounds, up, camera, smoke.space.metersPerUnit, choices);
   choices.push_back(fmt::format("albedo = {}, g = {}: bright smoke that scatters forward.", kAlbedo,
                                 kAnisotropy));
   SceneFile scene = parseScene(text, pattern, folder, sets);

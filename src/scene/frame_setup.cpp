@@ -133,7 +133,7 @@ double widthOfBox(const Box3d& box, const Vec3d& target, const Mat4d& placement,
     const double y = std::abs(glm::dot(p - target, Vec3d(placement[1])));
     half = std::max(half, std::max(x, y * resolution.x / resolution.y));
   }
-  return 2.16 * half;
+  return 2 * half;
 }
 
 void buildCamera(const SceneFile& scene, const SetupOptions& options, FrameSetup& setup) {
@@ -335,8 +335,7 @@ Mat4d frameBox(const Box3d& box, const Vec3d& target, const Vec3d& up, double fo
     const double y = std::abs(glm::dot(d, Vec3d(axes[1])));
     distance = std::max(distance, std::max(x / tanX, y / tanY) + glm::dot(d, toEye));
   }
-  constexpr double kMargin = 1.08;
-  return cameras::lookAt(target + toEye * std::max(distance * kMargin, 1e-9), target, up);
+  return cameras::lookAt(target + toEye * std::max(distance, 1e-9), target, up);
 }
 
 }  // namespace photosphere::scene

@@ -50,10 +50,7 @@ class Dumper {
         phase += fmt::format(", {} = {}", row.name, volume.phaseValues.format(row.name));
     phase += " }\n";
     if (volume.albedoGrid.empty()) return phase;
-    static constexpr Param row = {.name = "albedo", .type = ParamType::text};
-    ParamValues quoted(std::span<const Param>(&row, 1));
-    quoted.set("albedo", volume.albedoGrid, "dump");
-    return fmt::format("albedo = {}\n{}", quoted.format("albedo"), phase);
+    return fmt::format("albedo = {}\n{}", tomlText(volume.albedoGrid), phase);
   }
 
   // Given values as they are; the others as comments with their defaults, ready to be edited.
@@ -88,6 +85,14 @@ class Dumper {
 };
 
 }  // namespace
+
+std::string tomlText(const std::string& text) {
+  static constexpr Param row = {
+      .name = "text", .type = ParamType::text, .unit = "", .defaultText = "", .help = "any"};
+  ParamValues values(std::span<const Param>(&row, 1));
+  values.set("text", text, "text");
+  return values.format("text");
+}
 
 std::string SceneFile::resolvePath(const std::string& written) const {
   if (written.empty()) return written;

@@ -300,8 +300,8 @@ void SceneReader::read() {
   for (const auto& [key, node] : m_text.root) {
     const std::string k(key.str());
     if (std::find(std::begin(known), std::end(known), k) == std::end(known))
-      throw ConfigError(fmt::format("{}: unknown {}{} (known: {})", where(node, k, k),
-                                    node.is_table() ? "table" : "key", suggestion(k, known),
+      throw ConfigError(fmt::format("{}: unknown {} '{}'{} (known: {})", where(node, k, k),
+                                    node.is_table() ? "table" : "key", k, suggestion(k, known),
                                     fmt::join(known, ", ")));
   }
   m_scene.scene = ParamValues(sceneParams());

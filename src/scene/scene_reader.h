@@ -9,6 +9,9 @@ namespace photosphere::scene {
 /// Option rows in one list, the plug-in's after those common to its kind.
 std::vector<Param> joinRows(std::span<const Param> common, std::span<const Param> own);
 
+/// Text as a quoted TOML string.
+std::string tomlText(const std::string& text);
+
 class SceneReader {
  public:
   SceneReader(const TomlText& text, SceneFile& scene) : m_text(text), m_scene(scene) {}

@@ -71,8 +71,8 @@ std::uint64_t predictedLightFieldBytes(const FrameSetup& setup);
 ///         the budget
 void checkMemory(const FrameSetup& setup, bool lightField);
 
-/// World from camera that looks at a box from the front three-quarter so that its bounding sphere
-/// fits the frame.
+/// World from camera that looks at `target` from the front three-quarter, as near as keeps the
+/// whole box in the frame. The front is +Z where Y is up, -Y where Z is up.
 /// @param up          unit, world space
 /// @param fovDegrees  horizontal
 Mat4d frameBox(const Box3d& box, const Vec3d& target, const Vec3d& up, double fovDegrees,
