@@ -146,8 +146,6 @@ void printContent(const caches::CacheContent& content) {
 /// Particles and density, whichever the inputs lack.
 void complete(caches::CacheContent& content, const ConvertOptions& options, bool gridsCanBeKept) {
   joinParticles(content);
-  if (content.grids.empty() && content.particles.empty())
-    throw InputError("input", "holds neither grids nor particles; nothing to convert");
   if (content.particles.empty())
     addParticles(content, options);
   else if (gridsCanBeKept && content.particles.front().size() > 0 &&
@@ -184,6 +182,8 @@ void convertFrame(const std::vector<std::string>& inputs, const std::string& out
   const caches::CacheFormat& writer = caches::formatForWriting(output);
   printLine("{} -> {}", fmt::join(inputs, " + "), output);
   caches::CacheContent content = readInputs(inputs, options);
+  if (content.grids.empty() && content.particles.empty())
+    throw InputError(inputs.front(), "holds neither grids nor particles; nothing to convert");
   const double readSeconds = watch.seconds();
   // Of the formats that can be written, .vdb alone holds grids.
   const bool keepsGrids = writer.name == "vdb";

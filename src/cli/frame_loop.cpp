@@ -8,6 +8,7 @@
 #include "photosphere/core/frames.h"
 #include "photosphere/core/interrupt.h"
 #include "photosphere/core/log.h"
+#include "photosphere/core/output_file.h"
 
 namespace photosphere::cli {
 
@@ -21,6 +22,11 @@ void checkOutputPattern(const std::string& output, std::size_t frames) {
       fmt::format("{}: {} frames would overwrite one another; add #### where the frame number "
                   "belongs (such as {})",
                   output, frames, example));
+}
+
+void checkWritable(const std::string& path) {
+  if (path.empty()) return;
+  const OutputFile probe(path);  // writes nothing until it is committed
 }
 
 int runFrames(const std::vector<std::int64_t>& frames, bool keepGoing,

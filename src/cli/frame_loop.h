@@ -12,6 +12,10 @@ namespace photosphere::cli {
 /// @throws ConfigError that says to add ####
 void checkOutputPattern(const std::string& output, std::size_t frames);
 
+/// Finds out before the work whether an output can be written: its folder is created, and neither
+/// it nor the target refuses. An empty path is fine. @throws OutputError
+void checkWritable(const std::string& path);
+
 /// Calls `body` frame by frame. With `keepGoing` a frame that fails is reported and the others
 /// follow; an interrupt always ends the loop.
 /// @return exit code: ok, or someFramesFailed

@@ -164,18 +164,22 @@ void printPlan(const scene::SceneFile& scene, std::int64_t frame,
   scene::checkMemory(setup, lightField);
 }
 
+void printDryRun(std::int64_t frame, const std::string& output, std::int64_t cacheFrame,
+                 bool smoke) {
+  std::string source;
+  if (!smoke)
+    source = " without smoke: outside the caches' frames";
+  else if (cacheFrame != frame)
+    source = fmt::format(" from frame {} of the caches", cacheFrame);
+  printLine("frame {}: {}{}", frame, output, source);
+}
+
 std::string formatSeconds(const scene::StageSeconds& seconds) {
-  std::string text;
-  auto add = [&](const char* name, double value) {
-    if (value >= 0.005) text += fmt::format("{} {:.2f}, ", name, value);
-  };
-  add("read", seconds.read);
-  add("rasterize", seconds.rasterize);
-  add("trace", seconds.trace);
-  add("resolve", seconds.resolve);
-  add("march", seconds.march);
-  add("write", seconds.write);
-  return text + fmt::format("total {:.2f} s", seconds.total);
+  return fmt::format(
+      "read {:.2f}, rasterize {:.2f}, trace {:.2f}, resolve {:.2f}, march {:.2f}, write {:.2f}, "
+      "total {:.2f} s",
+      seconds.read, seconds.rasterize, seconds.trace, seconds.resolve, seconds.march, seconds.write,
+      seconds.total);
 }
 
 }  // namespace photosphere::cli

@@ -56,7 +56,12 @@ class CacheFrames {
 void printPlan(const scene::SceneFile& scene, std::int64_t frame,
                const scene::RenderRequest& request, bool forLightCache);
 
-/// `read 0.1, trace 2.3, ... s` without the stages that took no time.
+/// What --dry-run prints of every frame.
+/// @param smoke  false where --cache-hold clip leaves nothing to show
+void printDryRun(std::int64_t frame, const std::string& output, std::int64_t cacheFrame,
+                 bool smoke);
+
+/// `read 0.10, rasterize 0.00, ..., total 2.40 s`.
 std::string formatSeconds(const scene::StageSeconds& seconds);
 
 }  // namespace photosphere::cli

@@ -163,6 +163,8 @@ TEST_F(Convert, MergesTheFilesOfAFrame) {
   EXPECT_NE(file.tryFind("flame"), nullptr);
   const ParticleSet set = volume::gridToPoints(file.find("points"));
   ASSERT_EQ(set.size(), 40u);
+  for (const char* name : {"age", "pscale", "id"})
+    ASSERT_NE(set.find(name), nullptr) << name;
   int withAge = 0, withRadius = 0;
   for (std::size_t i = 0; i < set.size(); ++i) {
     withAge += set.find("age")->number(i) == 2.5;
@@ -183,6 +185,16 @@ TEST_F(Convert, GoesRoundThroughEveryPointFormat) {
   const caches::CacheContent last = caches::readCache(m_folder / "4.ply");
   ASSERT_EQ(last.particles.size(), 1u);
   expectSameParticles(set, last.particles.front(), 1e-5);
+}
+
+TEST_F(Convert, LeavesTheOldOutputWhenItFails) {
+  volume::writeVdb(m_folder / "good.vdb", {ballOfSmoke(0.1)});
+  volume::writeVdb(m_folder / "bad.vdb", {ballOfSmoke(0.2)});
+  truncate(m_folder / "bad.vdb");
+  ASSERT_EQ(convert({"good.vdb", "-o", "out.vdb"}).exitCode, 0);
+  const std::string before = readText(m_folder / "out.vdb");
+  EXPECT_EQ(convert({"bad.vdb", "-o", "out.vdb"}).exitCode, 4);
+  EXPECT_EQ(readText(m_folder / "out.vdb"), before);
 }
 
 class ConvertSequence : public Convert {

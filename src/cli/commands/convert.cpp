@@ -87,8 +87,8 @@ void runFrame(const Options& options, std::int64_t frame) {
     return;
   }
   checkFormatOptions(options.convert, inputs, output);
-  ConvertOptions convert = options.convert;
-  convertFrame(inputs, output, convert);
+  checkWritable(output);
+  convertFrame(inputs, output, options.convert);
 }
 
 int runConvert(Options& options) {

@@ -48,6 +48,9 @@ std::optional<render::Crop> parseCrop(const std::string& text) {
 
 void renderOne(const scene::SceneFile& scene, std::int64_t frame, const Options& options,
                const scene::RenderRequest& request, StatsFile& stats) {
+  checkWritable(framePath(options.write.path, frame));
+  checkWritable(framePath(options.write.preview, frame));
+  checkWritable(framePath(options.scene.stats, frame));
   scene::FrameResult result = scene::renderScene(scene, frame, request);
   for (const std::string& note : result.notes)
     log::info("frame {}: {}", frame, note);
@@ -81,7 +84,7 @@ int renderFrames(const scene::SceneFile& scene, const Options& options) {
     if (!options.scene.frames.dryRun)
       return renderOne(smoke ? scene : empty, frame, options, request, stats);
     if (smoke && !std::exchange(planned, true)) printPlan(scene, frame, request, false);
-    printLine("frame {}: {} from frame {} of the caches", frame, path, cacheFrame);
+    printDryRun(frame, path, cacheFrame, smoke);
   });
 }
 

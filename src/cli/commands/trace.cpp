@@ -33,8 +33,10 @@ bool isComplete(const std::string& path) {
 
 void traceOne(const scene::SceneFile& scene, std::int64_t frame, const Options& options,
               const scene::RenderRequest& request, StatsFile& stats) {
-  const scene::FrameStatistics s = scene::traceScene(scene, frame, options.output, request);
   const std::string path = framePath(options.output, frame);
+  checkWritable(path);
+  checkWritable(framePath(options.scene.stats, frame));
+  const scene::FrameStatistics s = scene::traceScene(scene, frame, options.output, request);
   printLine("frame {}: {}  photons {} emitted, {} scattered, {} stored  {}  peak {}", frame, path,
             s.photonsEmitted, s.photonsScattered, s.photonsStored, formatSeconds(s.seconds),
             formatBytes(s.peakMemoryBytes));
@@ -58,7 +60,7 @@ int traceFrames(const scene::SceneFile& scene, const Options& options) {
     if (cacheFrame != frame) request.cacheFrame = cacheFrame;
     if (!options.scene.frames.dryRun) return traceOne(scene, frame, options, request, stats);
     if (!std::exchange(planned, true)) printPlan(scene, frame, request, true);
-    printLine("frame {}: {} from frame {} of the caches", frame, path, cacheFrame);
+    printDryRun(frame, path, cacheFrame, true);
   });
 }
 
