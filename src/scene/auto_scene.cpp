@@ -12,7 +12,7 @@
 #include "photosphere/transport/tracking.h"
 #include "photosphere/volume/vdb_file.h"
 #include "scene_reader.h"
-#include "volume_source.h"
+#include "smoke_source.h"
 
 namespace photosphere::scene {
 

@@ -10,7 +10,7 @@
 #include "photosphere/core/resources.h"
 #include "photosphere/phase/phase.h"
 #include "photosphere/volume/rasterize.h"
-#include "volume_source.h"
+#include "smoke_source.h"
 
 namespace photosphere::scene {
 

@@ -1,4 +1,4 @@
-#include "volume_source.h"
+#include "smoke_source.h"
 
 #include <fmt/format.h>
 
