@@ -298,7 +298,7 @@ TEST_F(PipelineTest, ALightCacheStandsForTracing) {
 TEST_F(PipelineTest, TooLittleMemoryIsRefusedBeforeTheWork) {
   const std::string text = ballScene(ball("b.vdb"), Vec3d(0), 1);
   const std::string message = complaint(
-      [&] { renderScene(scene(text, {"render.memory_limit=0.0002"}), 1); }, ExitCode::memory);
+      [&] { renderScene(scene(text, {"render.memory_limit=1e-5"}), 1); }, ExitCode::memory);
   EXPECT_TRUE(contains(message, "estimator.light_voxel")) << message;
   EXPECT_TRUE(contains(message, "render.memory_limit")) << message;
   // The histogram alone passes a budget that the view basis meets.

@@ -50,9 +50,8 @@ class Medium {
   float extinction(const Vec3f& p) const {
     const Placed& first = m_placed.front();
     float sum = first.scale * first.field->sample(first.nodeFromLocal(p));
-    if (m_placed.size() == 1) return sum;
-    for (const Placed& v : m_placed)
-      sum += v.scale * v.field->sample(v.nodeFromLocal(p));
+    for (std::size_t i = 1; i < m_placed.size(); ++i)
+      sum += m_placed[i].scale * m_placed[i].field->sample(m_placed[i].nodeFromLocal(p));
     return sum;
   }
   /// All coefficients at a point.
