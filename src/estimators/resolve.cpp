@@ -48,7 +48,7 @@ Colours foldPhase(const LightField& field, const View& view, std::size_t set, in
   const sphere::BinWeights table(
       partition,
       [&](const Vec3f& w, const Vec3f& wo) { return static_cast<double>(phase.evaluate(w, wo)); },
-      phase.g());
+      phase.g(), sphere::Reconstruction::smooth);
   const int bins = layout.bins();
   parallelFor(colours.size(), 1024, [&](std::size_t begin, std::size_t end) {
     std::vector<float> weights(static_cast<std::size_t>(bins));
@@ -59,6 +59,8 @@ Colours foldPhase(const LightField& field, const View& view, std::size_t set, in
       for (int j = 0; j < bins; ++j)
         for (int c = 0; c < layout.channels; ++c)
           sum[c] += weights[static_cast<std::size_t>(j)] * values[j * layout.channels + c];
+      // The smooth reconstruction dips below zero beside a sharp peak; light does not.
+      sum = glm::max(sum, Rgb(0.0f));
       colours[i] = readColour(&sum.x, layout.channels);
     }
   });

@@ -6,10 +6,13 @@
 #include "cell_quadrature.h"
 #include "directions.h"
 #include "photosphere/core/parallel.h"
+#include "reconstruction.h"
 
 namespace photosphere::sphere {
 
 namespace {
+
+constexpr int kMaxSmoothBins = 512;
 
 // Lattice edges along an octant's side for a lobe: about five to the lobe's width. A wide lobe
 // needs a few for the cells' own size.
@@ -19,16 +22,51 @@ int latticeFor(double width) {
 
 }  // namespace
 
-BinWeights::BinWeights(const Partition& partition, const Phase& phase, double meanCosine)
+BinWeights::BinWeights(const Partition& partition, const Phase& phase, double meanCosine,
+                       Reconstruction reconstruction)
     : m_partition(partition) {
+  if (reconstruction == Reconstruction::constant || size() > kMaxSmoothBins) {
+    tabulate(partition, phase, meanCosine);
+    return;
+  }
+  const Partition fine(partition.rows() * (partition.rows() <= 2 ? 3 : 2));
+  tabulate(fine, phase, meanCosine);
+  reduce(fine);
+}
+
+// Weights of fine cells become weights of bins: light in a bin is spread over the fine cells around
+// it.
+void BinWeights::reduce(const Partition& fine) {
+  const auto bins = static_cast<std::size_t>(size());
+  const auto cells = static_cast<std::size_t>(fine.size());
+  const std::vector<double> spread = smoothReconstruction(m_partition, fine);
+  const std::size_t nodes = m_table.size() / cells;
+  std::vector<float> reduced(nodes * bins);
+  parallelFor(nodes, 8, [&](std::size_t begin, std::size_t end) {
+    std::vector<double> row(bins);
+    for (std::size_t k = begin; k < end; ++k) {
+      std::fill(row.begin(), row.end(), 0.0);
+      for (std::size_t i = 0; i < cells; ++i) {
+        const double w = static_cast<double>(m_table[k * cells + i]);
+        for (std::size_t j = 0; j < bins; ++j)
+          row[j] += w * spread[i * bins + j];
+      }
+      for (std::size_t j = 0; j < bins; ++j)
+        reduced[k * bins + j] = static_cast<float>(row[j]);
+    }
+  });
+  m_table = std::move(reduced);
+}
+
+void BinWeights::tabulate(const Partition& cellsOf, const Phase& phase, double meanCosine) {
   const double width = std::max(0.005, 1 - std::abs(meanCosine));
   const float side = meanCosine < 0 ? -1.0f : 1.0f;
   m_lattice = latticeFor(width);
-  const std::size_t count = static_cast<std::size_t>(size());
+  const std::size_t count = static_cast<std::size_t>(cellsOf.size());
   const std::size_t cells = count / 8;
   const std::size_t nodes = static_cast<std::size_t>((m_lattice + 1) * (m_lattice + 2) / 2);
   m_table.resize(nodes * count);
-  const CellQuadrature quadrature(partition, width);
+  const CellQuadrature quadrature(cellsOf, width);
 
   std::vector<Vec3f> directions;
   for (int j = 0; j <= m_lattice; ++j)

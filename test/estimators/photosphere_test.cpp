@@ -92,7 +92,6 @@ TEST_P(Agreement, WithPathTracing) {
   LightFieldLayout layout;
   layout.carrier = c.carrier;
   layout.basis = c.basis;
-  layout.rows = 4;
   layout.channels = 1;
   const PhotosphereFrame frame = renderPhotosphere(j.scene, layout, 1'000'000, 5);
   const LayerError total =
@@ -191,30 +190,39 @@ TEST(LightField, CollisionDepositAgreesInTheMean) {
   EXPECT_NEAR(image / reference, 1.0, 0.015);
 }
 
-TEST(LightField, PowerOnParticlesAgreesWithTheRangeOfThePaper) {
-  // The paper's two energy rules blur the source itself, so they are held to a wider bound than the
-  // fluence form (METHOD.md section 5: the paper's own estimator is 10 % off).
+// The paper's energy rules blur the source itself and so are off at the smoke's edge (METHOD.md
+// section 5 finds about 10 % for the paper's settings); the error must shrink with the radius.
+double powerRatio(const TestScene& scene, estimators::EnergyRule rule, double radius,
+                  double reference) {
+  LightFieldLayout layout;
+  layout.channels = 1;
+  layout.carrier = Carrier::particles;
+  layout.basis = Basis::histogram;
+  layout.deposit = Deposit::collision;
+  layout.energy = rule;
+  layout.radius = radius;
+  const PhotosphereFrame frame = renderPhotosphere(scene, layout, 100'000, 5);
+  double image = 0;
+  for (const Rgb& c : frame.layers.multiple)
+    image += static_cast<double>(c.y);
+  std::printf("  rule %d, radius %.3f: ratio %.4f\n", static_cast<int>(rule), radius,
+              image / reference);
+  return image / reference;
+}
+
+TEST(LightField, PowerOnParticlesConvergesWithItsRadius) {
   TestScene scene = sphereScene(6, 0.9, 0.3, 32, kPixels);
   scene.particles = seedParticles(*scene.medium, 60000);
   const render::FrameLayers truth = renderPath(scene, 256, 1);
   double reference = 0;
   for (const Rgb& c : truth.multiple)
     reference += static_cast<double>(c.y);
-  for (const auto rule : {estimators::EnergyRule::gather, estimators::EnergyRule::scatter}) {
-    LightFieldLayout layout;
-    layout.channels = 1;
-    layout.carrier = Carrier::particles;
-    layout.basis = Basis::histogram;
-    layout.deposit = Deposit::collision;
-    layout.energy = rule;
-    layout.radius = 0.06;
-    const PhotosphereFrame frame = renderPhotosphere(scene, layout, 100'000, 5);
-    double image = 0;
-    for (const Rgb& c : frame.layers.multiple)
-      image += static_cast<double>(c.y);
-    std::printf("  rule %d: ratio %.4f\n", static_cast<int>(rule), image / reference);
-    EXPECT_NEAR(image / reference, 1.0, 0.15);
-  }
+  const double wide = powerRatio(scene, estimators::EnergyRule::gather, 0.06, reference);
+  const double narrow = powerRatio(scene, estimators::EnergyRule::gather, 0.03, reference);
+  EXPECT_NEAR(wide, 1.0, 0.2);
+  EXPECT_NEAR(narrow, 1.0, 0.12);
+  EXPECT_LT(std::abs(narrow - 1), std::abs(wide - 1));
+  EXPECT_NEAR(powerRatio(scene, estimators::EnergyRule::scatter, 0.06, reference), 1.0, 0.05);
 }
 
 bool sameBits(const std::vector<Rgb>& a, const std::vector<Rgb>& b) {

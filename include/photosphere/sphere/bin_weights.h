@@ -10,6 +10,15 @@
 
 namespace photosphere::sphere {
 
+/// How the light inside a bin is thought to be spread.
+enum class Reconstruction {
+  constant,  ///< evenly over the cell: the phase function is averaged over the bin
+  smooth,    ///< as a smooth function over the sphere whose bin means are the histogram's: removes
+           ///< most of the error that wide bins make where phase and light peak together; weights
+           ///< may be slightly negative. Above 512 bins the same as `constant`, which is as good
+           ///< there
+};
+
 /// Table of W_j(wo) = (1/A) * integral over cell j of f(w, wo) dw [1/sr], the phase function
 /// averaged over bin j, for every outgoing direction wo. The partition looks the same from every
 /// octant, so only first-octant wo are tabulated, on a triangular lattice whose spacing follows the
@@ -24,7 +33,8 @@ class BinWeights {
   /// @param meanCosine  g of the lobe: 1 - |g| sets the resolution of the quadrature and lattice,
   /// its
   ///                    sign the side of the peak. Finer than |g| = 0.995 is treated as that.
-  BinWeights(const Partition& partition, const Phase& phase, double meanCosine);
+  BinWeights(const Partition& partition, const Phase& phase, double meanCosine,
+             Reconstruction reconstruction = Reconstruction::constant);
 
   int size() const { return m_partition.size(); }
   /// Writes size() weights [1/sr] for a unit propagation direction toward the eye. The zero vector
@@ -34,6 +44,8 @@ class BinWeights {
   int latticeSize() const { return m_lattice; }
 
  private:
+  void tabulate(const Partition& cells, const Phase& phase, double meanCosine);
+  void reduce(const Partition& fine);
   const float* node(int i, int j) const;
 
   Partition m_partition;
