@@ -65,26 +65,6 @@ Colours foldPhase(const LightField& field, const View& view, std::size_t set, in
   return colours;
 }
 
-// Mean extinction of each light voxel, over a few points inside it.
-std::vector<float> meanExtinction(const Medium& medium, const SupportLattice& lattice,
-                                  double lightVoxel) {
-  std::vector<float> mean(lattice.size());
-  const int n = std::clamp(static_cast<int>(std::ceil(lightVoxel)), 2, 4);
-  const auto step = static_cast<float>(lattice.edge() / n);
-  parallelFor(mean.size(), 1024, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      const Vec3f corner = lattice.center(i) - static_cast<float>(0.5 * lattice.edge());
-      float sum = 0.0f;
-      for (int z = 0; z < n; ++z)
-        for (int y = 0; y < n; ++y)
-          for (int x = 0; x < n; ++x)
-            sum += medium.extinction(corner + (Vec3f(x, y, z) + 0.5f) * step);
-      mean[i] = sum / static_cast<float>(n * n * n);
-    }
-  });
-  return mean;
-}
-
 struct Tap {
   Vec3i offset;
   float weight;
@@ -105,32 +85,54 @@ std::vector<Tap> kernelTaps(SpatialKernel kernel, double radiusInVoxels) {
   return taps;
 }
 
-// The mean of plain and extinction-weighted smoothing (METHOD.md section 5.3): each alone is off at
-// the smoke's edge, with opposite sign.
-Colours smoothVoxels(const SupportLattice& lattice, const Colours& colours,
-                     const std::vector<float>& extinction, const std::vector<Tap>& taps) {
-  if (taps.size() == 1) return colours;
+// Weighted mean over the active neighbours; inactive ones leave both sum and weight.
+Colours convolve(const SupportLattice& lattice, const Colours& colours,
+                 const std::vector<Tap>& taps) {
   Colours out(colours.size());
   parallelFor(out.size(), 512, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      const Vec3i& v = lattice.voxel(i);
-      Vec4f plain(0.0f), weighted(0.0f);
-      float plainWeight = 0.0f, weightedWeight = 0.0f;
+      Vec4f sum(0.0f);
+      float weight = 0.0f;
       for (const Tap& tap : taps) {
-        const std::int32_t n = lattice.number(v + tap.offset);
+        const std::int32_t n = lattice.number(lattice.voxel(i) + tap.offset);
         if (n < 0) continue;
-        const Vec4f& value = colours[static_cast<std::size_t>(n)];
-        const float sigma = tap.weight * extinction[static_cast<std::size_t>(n)];
-        plain += tap.weight * value;
-        plainWeight += tap.weight;
-        weighted += sigma * value;
-        weightedWeight += sigma;
+        sum += tap.weight * colours[static_cast<std::size_t>(n)];
+        weight += tap.weight;
       }
-      plain /= plainWeight;  // at least this voxel itself
-      out[i] = weightedWeight > 0.0f ? 0.5f * (plain + weighted / weightedWeight) : plain;
+      out[i] = sum / weight;  // at least this voxel itself
     }
   });
   return out;
+}
+
+// What reading trilinearly between voxel means does to a smooth field: its mean over a voxel
+// becomes this mean of the neighbours' (along an axis 1/8, 3/4, 1/8).
+std::vector<Tap> readingTaps() {
+  std::vector<Tap> taps;
+  for (int z = -1; z <= 1; ++z)
+    for (int y = -1; y <= 1; ++y)
+      for (int x = -1; x <= 1; ++x)
+        taps.push_back(
+            {{x, y, z}, (x ? 0.125f : 0.75f) * (y ? 0.125f : 0.75f) * (z ? 0.125f : 0.75f)});
+  return taps;
+}
+
+// Adds what a second blur takes away ("twicing", Stuetzle & Mittal 1979): the bias of voxel mean,
+// kernel and interpolation falls from second to fourth order in their width. Fluence stays >= 0.
+Colours sharpen(const Colours& once, const Colours& again) {
+  Colours out(once.size());
+  for (std::size_t i = 0; i < out.size(); ++i)
+    out[i] = glm::max(Vec4f(0.0f), 2.0f * once[i] - again[i]);
+  return out;
+}
+
+Colours smoothVoxels(const SupportLattice& lattice, const Colours& colours, SpatialKernel kernel,
+                     double radius) {
+  const std::vector<Tap> taps = kernelTaps(kernel, radius / lattice.edge());
+  const bool widened = taps.size() > 1;
+  const Colours once = widened ? convolve(lattice, colours, taps) : colours;
+  const Colours twice = widened ? convolve(lattice, once, taps) : once;
+  return sharpen(once, convolve(lattice, twice, readingTaps()));
 }
 
 // Gives voxels that no particle reached the mean of their neighbours, ring by ring.
@@ -160,52 +162,91 @@ void fillUnreached(const SupportLattice& lattice, Colours& colours,
   }
 }
 
-// Particle values gathered at the voxels of a lattice.
-Colours gatherParticles(const LightField& field, const Medium& medium,
-                        const SupportLattice& lattice, const Colours& colours) {
-  const LightFieldLayout& layout = field.layout;
-  const double radius = std::max(layout.radius, 1e-12);
-  const ParticleIndex index(field.particles, radius);
-  const auto r = static_cast<float>(radius);
-  std::vector<float> extinction(field.particles.size());
-  float largest = 0.0f;
-  for (std::size_t i = 0; i < extinction.size(); ++i) {
-    extinction[i] = medium.extinction(field.particles[i]);
-    largest = std::max(largest, extinction[i]);
+// Gathers particle values at the voxels of a lattice.
+class ParticleGather {
+ public:
+  ParticleGather(const LightField& field, const Medium& medium, const SupportLattice& lattice)
+      : m_field(field),
+        m_lattice(lattice),
+        m_index(field.particles, std::max(field.layout.radius, 1e-12)) {
+    // Particles crowd where smoke is dense; dividing by the extinction evens them out.
+    float largest = 0.0f;
+    for (const Vec3f& p : field.particles) {
+      m_extinction.push_back(medium.extinction(p));
+      largest = std::max(largest, m_extinction.back());
+    }
+    for (float& e : m_extinction)
+      e = std::max(e, 1e-3f * largest + 1e-30f);
   }
-  const double deposit = std::max(layout.depositRadius, 1e-12);
-  const auto depositVolume = static_cast<float>(4.0 / 3.0 * kPi * deposit * deposit * deposit);
-  const auto gatherVolume = static_cast<float>(4.0 / 3.0 * kPi * radius * radius * radius);
-  Colours out(lattice.size(), Vec4f(0.0f));
-  std::vector<std::uint8_t> reached(lattice.size(), 0);
-  parallelFor(out.size(), 256, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      Vec4f natural(0.0f), even(0.0f), whole(0.0f);
+
+  /// Fluence: the mean of the particles' own and the evened-out average, which err with opposite
+  /// sign at the smoke's edge (METHOD.md section 5.3).
+  Colours fluence(const Colours& colours) const {
+    std::vector<std::uint8_t> reached(m_lattice.size(), 0);
+    Colours out = gather([&](std::size_t voxel, const Vec3f& center, float radius) {
+      Vec4f natural(0.0f), even(0.0f);
       float naturalWeight = 0.0f, evenWeight = 0.0f;
-      index.forEachWithin(lattice.center(i), r, [&](std::size_t p, float squared) {
-        const float w = kernelWeight(layout.kernel, squared / (r * r));
+      m_index.forEachWithin(center, radius, [&](std::size_t p, float squared) {
+        const float w = kernelWeight(m_field.layout.kernel, squared / (radius * radius));
+        const float e = w / m_extinction[p];
         natural += w * colours[p];
         naturalWeight += w;
-        // Particles crowd where smoke is dense; dividing by the extinction evens them out.
-        const float e = w / std::max(extinction[p], 1e-3f * largest + 1e-30f);
         even += e * colours[p];
         evenWeight += e;
-        whole += colours[p];
       });
-      if (layout.holdsPower() && layout.energy == EnergyRule::scatter) {
-        out[i] = whole / gatherVolume;  // eq. 7b
-        reached[i] = 1;
-      } else if (naturalWeight > 0.0f) {
-        // Eq. 7a with the ball's volume 4/3 pi R^3 (the paper prints 3/4), or the fluence itself.
-        out[i] = layout.holdsPower() ? natural / (naturalWeight * depositVolume)
-                                     : 0.5f * (natural / naturalWeight + even / evenWeight);
-        reached[i] = 1;
-      }
-    }
-  });
-  if (!layout.holdsPower()) fillUnreached(lattice, out, reached);
-  return out;
-}
+      reached[voxel] = naturalWeight > 0.0f;
+      return reached[voxel] ? 0.5f * (natural / naturalWeight + even / evenWeight) : Vec4f(0.0f);
+    });
+    fillUnreached(m_lattice, out, reached);
+    return out;
+  }
+
+  /// Collision density [W m^-3] by eq. 7a with the ball's volume 4/3 pi R^3 (the paper prints 3/4).
+  Colours gatherRule(const Colours& colours) const {
+    const float volume = ballVolume(m_field.layout.depositRadius);
+    return gather([&](std::size_t, const Vec3f& center, float radius) {
+      Vec4f sum(0.0f);
+      float weight = 0.0f;
+      m_index.forEachWithin(center, radius, [&](std::size_t p, float squared) {
+        const float w = kernelWeight(m_field.layout.kernel, squared / (radius * radius));
+        sum += w * colours[p];
+        weight += w;
+      });
+      return weight > 0.0f ? sum / (weight * volume) : Vec4f(0.0f);
+    });
+  }
+
+  /// Collision density [W m^-3] by eq. 7b.
+  Colours scatterRule(const Colours& colours) const {
+    const float volume = ballVolume(m_field.layout.radius);
+    return gather([&](std::size_t, const Vec3f& center, float radius) {
+      Vec4f sum(0.0f);
+      m_index.forEachWithin(center, radius, [&](std::size_t p, float) { sum += colours[p]; });
+      return sum / volume;
+    });
+  }
+
+ private:
+  static float ballVolume(double radius) {
+    const double r = std::max(radius, 1e-12);
+    return static_cast<float>(4.0 / 3.0 * kPi * r * r * r);
+  }
+  template <class At>
+  Colours gather(const At& at) const {
+    Colours out(m_lattice.size());
+    const auto radius = static_cast<float>(std::max(m_field.layout.radius, 1e-12));
+    parallelFor(out.size(), 256, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i)
+        out[i] = at(i, m_lattice.center(i), radius);
+    });
+    return out;
+  }
+
+  const LightField& m_field;
+  const SupportLattice& m_lattice;
+  ParticleIndex m_index;
+  std::vector<float> m_extinction;
+};
 
 Field layOut(const SupportLattice& lattice, const Colours& colours) {
   return Field(Vec3i(0), lattice.bricks(), lattice.activeBricks(),
@@ -233,19 +274,11 @@ class ResolvedField final : public InscatterSource {
         field.layout.carrier == Carrier::particles ? own : field.lattice;
     m_inverseEdge = static_cast<float>(1.0 / lattice.edge());
     m_firstNode = Vec3f(lattice.origin() + 0.5 * lattice.edge());
-    std::vector<float> extinction;
-    std::vector<Tap> taps;
-    if (field.layout.carrier == Carrier::voxels) {
-      extinction = meanExtinction(medium, lattice, field.layout.lightVoxel);
-      taps = kernelTaps(field.layout.kernel, field.layout.radius / lattice.edge());
-    }
     for (std::size_t set = 0; set < (m_unscattered ? 2u : 1u); ++set)
       for (int k = 0; k < m_phases; ++k) {
         const Colours folded =
             foldPhase(field, view, set, k, medium.phases()[static_cast<std::size_t>(k)]);
-        m_fields.push_back(layOut(lattice, field.layout.carrier == Carrier::voxels
-                                               ? smoothVoxels(lattice, folded, extinction, taps)
-                                               : gatherParticles(field, medium, lattice, folded)));
+        m_fields.push_back(layOut(lattice, spread(medium, field, lattice, folded)));
       }
   }
 
@@ -265,6 +298,24 @@ class ResolvedField final : public InscatterSource {
   bool carriesUnscattered() const override { return m_unscattered; }
 
  private:
+  // From the carriers to the voxels that lookups read.
+  Colours spread(const Medium& medium, const LightField& field, const SupportLattice& lattice,
+                 const Colours& folded) const {
+    const LightFieldLayout& layout = field.layout;
+    if (layout.carrier == Carrier::voxels)
+      return smoothVoxels(lattice, folded, layout.kernel, layout.radius);
+    const ParticleGather gather(field, medium, lattice);
+    if (layout.holdsPower())
+      return layout.energy == EnergyRule::gather ? gather.gatherRule(folded)
+                                                 : gather.scatterRule(folded);
+    const Colours once = gather.fluence(folded);
+    const Field readable = layOut(lattice, once);
+    Colours atParticles(field.particles.size());
+    for (std::size_t i = 0; i < atParticles.size(); ++i)
+      atParticles[i] = readable.sample((field.particles[i] - m_firstNode) * m_inverseEdge);
+    return sharpen(once, gather.fluence(atParticles));
+  }
+
   int m_phases;
   bool m_unscattered;
   bool m_power;
