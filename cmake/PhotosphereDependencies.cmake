@@ -1,14 +1,11 @@
-# Finds every library that photosphere links. Used by the build and, installed beside
+# Finds every library that a program linking photosphere needs. Used by the build and, installed beside
 # photosphereConfig.cmake, by consumers of the package: both need the same repairs.
 
 find_package(Threads REQUIRED)
 find_package(ZLIB REQUIRED)
 find_package(TBB REQUIRED)
 find_package(fmt REQUIRED)
-find_package(spdlog REQUIRED)
 find_package(glm REQUIRED)
-find_package(nlohmann_json REQUIRED)
-find_package(CLI11 REQUIRED)
 
 # Debian keeps FindOpenVDB.cmake off the search path. It calls find_package(Boost) for iostreams.
 find_path(PHOTOSPHERE_FIND_OPENVDB_DIR FindOpenVDB.cmake

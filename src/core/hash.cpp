@@ -17,7 +17,9 @@ std::uint64_t mix(std::uint64_t z) {
 
 }  // namespace
 
-void Hasher::word(std::uint64_t w) { m_state = mix(m_state ^ w); }
+void Hasher::word(std::uint64_t w) {
+  m_state = mix(m_state ^ w);
+}
 
 void Hasher::bytes(const void* data, std::size_t size) {
   const char* p = static_cast<const char*>(data);
@@ -32,7 +34,11 @@ void Hasher::bytes(const void* data, std::size_t size) {
   }
 }
 
-std::uint64_t Hasher::value() const { return mix(m_state ^ m_length); }
-std::string Hasher::hex() const { return fmt::format("{:016x}", value()); }
+std::uint64_t Hasher::value() const {
+  return mix(m_state ^ m_length);
+}
+std::string Hasher::hex() const {
+  return fmt::format("{:016x}", value());
+}
 
 }  // namespace photosphere

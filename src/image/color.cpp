@@ -110,13 +110,14 @@ std::string shippedColorConfig() {
   std::vector<std::string> places;
   if (const char* data = std::getenv("PHOTOSPHERE_DATA"); data && *data)
     places.push_back((fs::path(data) / "color/config.ocio").string());
-  places.push_back((fs::path(PHOTOSPHERE_DATA_DIR) / "color/config.ocio").string());
+  // Beside an installed tool first: the source tree that built it may be gone, or changed.
   std::error_code error;
   const fs::path executable = fs::read_symlink("/proc/self/exe", error);
   if (!error) {
     const fs::path prefix = executable.parent_path().parent_path();
     places.push_back((prefix / "share/photosphere/color/config.ocio").string());
   }
+  places.push_back((fs::path(PHOTOSPHERE_DATA_DIR) / "color/config.ocio").string());
   for (const std::string& place : places)
     if (fs::is_regular_file(place, error)) return place;
   throw InputMissingError(

@@ -13,8 +13,8 @@ using transport::Segment;
 // Transmittance below which the rest of a ray is not marched: far under half-float resolution of
 // what it could still add.
 constexpr float kOpaque = 1e-5f;
-// Largest optical depth of one step by the cell's majorant, and the finest step it may ask for as a part
-// of the user's.
+// Largest optical depth of one step by the cell's majorant, and the finest step it may ask for as a
+// part of the user's.
 constexpr float kStepDepth = 0.5f;
 constexpr float kFinest = 1.0f / 16.0f;
 
@@ -59,10 +59,12 @@ class MarchIntegrator final : public Integrator {
          !walk.done(); walk.advance()) {
       if (!(walk.majorant() > 0.0f)) continue;
       const float end = walk.end();
-      // The source inside a step varies by the extinction of the light on its way in, which the midpoint
-      // rule sees to (depth)^2 / 24: dense smoke takes finer steps, in powers of two of one lattice.
+      // The source inside a step varies by the extinction of the light on its way in, which the
+      // midpoint rule sees to (depth)^2 / 24: dense smoke takes finer steps, in powers of two of
+      // one lattice.
       float h = m_step;
-      while (h * walk.majorant() > kStepDepth && h > m_step * kFinest) h *= 0.5f;
+      while (h * walk.majorant() > kStepDepth && h > m_step * kFinest)
+        h *= 0.5f;
       float t0 = std::max(done, walk.begin());
       while (t0 < end) {
         // The next point of the step lattice beyond t0; a step may run on past the cell, where the

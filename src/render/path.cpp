@@ -44,13 +44,13 @@ class PathIntegrator final : public Integrator {
       Collision hit;
       if (scatterings == 0 && segment.length > 0.0f) {
         float transmittance = 1.0f;
-        hit = transport::sampleCollisionAndTransmittance(m_medium, segment.origin, segment.direction,
-                                                         segment.length, rng, counters.tracking,
-                                                         transmittance);
+        hit = transport::sampleCollisionAndTransmittance(m_medium, segment.origin,
+                                                         segment.direction, segment.length, rng,
+                                                         counters.tracking, transmittance);
         result.transmittance = Rgb(transmittance);
       } else if (segment.length > 0.0f) {
-        hit = transport::sampleCollision(m_medium, segment.origin, segment.direction, segment.length,
-                                         rng, counters.tracking);
+        hit = transport::sampleCollision(m_medium, segment.origin, segment.direction,
+                                         segment.length, rng, counters.tracking);
       }
       if (!hit.happened()) {
         const Vec3f d = scatterings == 0 ? direction : segment.direction;
@@ -119,10 +119,10 @@ class PathIntegrator final : public Integrator {
     const lights::Illumination in = light.illuminate(p, u);
     if (!(maxComponent(in.irradiance) > 0.0f)) return;
     const Rgb scattered = phaseAlbedo(p, in.direction, -d);
-    const float transmittance = m_options.effects.shadows
-                                    ? transport::trackTransmittance(m_medium, p, -in.direction,
-                                                                    in.distance, rng, counters.tracking)
-                                    : 1.0f;
+    const float transmittance = m_options.effects.shadows ? transport::trackTransmittance(
+                                                                m_medium, p, -in.direction,
+                                                                in.distance, rng, counters.tracking)
+                                                          : 1.0f;
     add(result,
         throughput * scattered * in.irradiance * (transmittance / static_cast<float>(probability)),
         scatterings + 1);

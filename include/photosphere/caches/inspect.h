@@ -23,9 +23,9 @@ struct GridReport {
   bool hasValues = false;             ///< false: the fields up to firstInvalid mean nothing
   double min = 0, max = 0, mean = 0;  ///< of lengths for a vector grid
   std::uint64_t nans = 0, infinities = 0, negatives = 0;
-  Vec3i firstInvalid{0};                         ///< index of the first NaN or infinite voxel
-  std::optional<volume::OpticalDepth> opticalDepth;      ///< of a density grid
-  std::optional<double> velocityVoxelsPerFrame;  ///< longest vector at 24 frames a second
+  Vec3i firstInvalid{0};                             ///< index of the first NaN or infinite voxel
+  std::optional<volume::OpticalDepth> opticalDepth;  ///< of a density grid
+  std::optional<double> velocityVoxelsPerFrame;      ///< longest vector at 24 frames a second
 };
 
 struct AttributeReport {

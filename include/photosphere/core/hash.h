@@ -10,7 +10,8 @@
 
 namespace photosphere {
 
-/// 64-bit hash over bytes, eight at a time, with the mixing step of splitmix64 (Steele et al. 2014).
+/// 64-bit hash over bytes, eight at a time, with the mixing step of splitmix64 (Steele et al.
+/// 2014).
 class Hasher {
  public:
   void bytes(const void* data, std::size_t size);
@@ -19,15 +20,11 @@ class Hasher {
     bytes(s.data(), s.size());
   }
   template <class T>
-    requires std::is_arithmetic_v<T>
-  void number(T value) {
-    bytes(&value, sizeof value);
-  }
+  requires std::is_arithmetic_v<T>
+  void number(T value) { bytes(&value, sizeof value); }
   template <class T>
-    requires std::is_arithmetic_v<T>
-  void numbers(const T* values, std::size_t count) {
-    bytes(values, count * sizeof(T));
-  }
+  requires std::is_arithmetic_v<T>
+  void numbers(const T* values, std::size_t count) { bytes(values, count * sizeof(T)); }
   std::uint64_t value() const;
   /// 16 hexadecimal digits.
   std::string hex() const;

@@ -31,7 +31,8 @@ struct Param {
   std::string_view name;
   ParamType type = ParamType::real;
   std::string_view unit = {};
-  std::string_view defaultText = {};  ///< as in a scene file, without quotes: `1.0`, `[0, 0, 5]`, `true`
+  std::string_view defaultText =
+      {};  ///< as in a scene file, without quotes: `1.0`, `[0, 0, 5]`, `true`
   std::string_view help = {};
   double min = -std::numeric_limits<double>::infinity();
   double max = std::numeric_limits<double>::infinity();

@@ -12,10 +12,10 @@ namespace photosphere::image {
 struct DisplayOptions {
   std::string layer = {};  ///< empty: R, G, B
   std::string renderingSpace{kDefaultRenderingSpace};
-  std::string display = {};    ///< empty: the config's default
-  std::string view = {};       ///< empty: the display's default
-  float exposure = 0.0f;  ///< [stops]
-  bool dither = false;    ///< else rounded to the nearest of 256 levels
+  std::string display = {};  ///< empty: the config's default
+  std::string view = {};     ///< empty: the display's default
+  float exposure = 0.0f;     ///< [stops]
+  bool dither = false;       ///< else rounded to the nearest of 256 levels
   int jpegQuality = 92;
 };
 

@@ -78,8 +78,8 @@ class SupportLattice {
 template <class Visit>
 void SupportLattice::walk(const Vec3f& from, const Vec3f& d, float length,
                           const Visit& visit) const {
-  // Everything in voxel units: u(t) = start + d t, t in voxels. One set of scalars per axis: a vector
-  // indexed at run time would live in memory.
+  // Everything in voxel units: u(t) = start + d t, t in voxels. One set of scalars per axis: a
+  // vector indexed at run time would live in memory.
   const Vec3f start = (from - m_originF) * m_inverseEdge;
   const float edge = static_cast<float>(m_edge);
   const float end = length * m_inverseEdge;

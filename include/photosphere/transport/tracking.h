@@ -72,11 +72,11 @@ inline Collision sampleCollision(const Medium& medium, const Vec3f& o, const Vec
   return {};
 }
 
-/// The first real collision and, from the same tentative ones, the ratio-tracked transmittance of the
-/// whole ray: both unbiased, and correlated with each other.
-inline Collision sampleCollisionAndTransmittance(const Medium& medium, const Vec3f& o, const Vec3f& d,
-                                                 float length, Rng& rng, TrackingCounters& counters,
-                                                 float& transmittance) {
+/// The first real collision and, from the same tentative ones, the ratio-tracked transmittance of
+/// the whole ray: both unbiased, and correlated with each other.
+inline Collision sampleCollisionAndTransmittance(const Medium& medium, const Vec3f& o,
+                                                 const Vec3f& d, float length, Rng& rng,
+                                                 TrackingCounters& counters, float& transmittance) {
   volume::MajorantGrid::Walk walk(medium.majorants(), o, d, 0.0f, length);
   Collision first;
   transmittance = 1.0f;

@@ -73,8 +73,9 @@ class MajorantGrid {
         const float size = grid.m_cellSize[axis];
         const bool up = d > 0.0f;
         delta = std::abs(size * inverse);
-        next = std::max(t0, (grid.m_origin[axis] + static_cast<float>(cell + (up ? 1 : 0)) * size - o) *
-                                inverse);
+        next = std::max(
+            t0,
+            (grid.m_origin[axis] + static_cast<float>(cell + (up ? 1 : 0)) * size - o) * inverse);
         left = up ? grid.m_dims[axis] - 1 - cell : cell;
         stride = up ? toNeighbour : -toNeighbour;
       }

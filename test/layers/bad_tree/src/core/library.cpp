@@ -1,0 +1,2 @@
+#include <nanoflann.hpp>
+#include <spdlog/spdlog.h>

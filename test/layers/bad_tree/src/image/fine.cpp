@@ -1,0 +1,1 @@
+#include "photosphere/core/error.h"
