@@ -15,5 +15,5 @@ int main() {
   std::printf("%s, %zu frames, %zu formats, %zu scene keys\n", photosphere::versionText().c_str(),
               frames.size(), formats.size(), rows.size());
   return frames == std::vector<std::int64_t>{1, 5, 9} && formats.size() >= 5 && !rows.empty() ? 0
-                                                                                               : 1;
+                                                                                              : 1;
 }
