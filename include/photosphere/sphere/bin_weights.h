@@ -14,9 +14,9 @@ namespace photosphere::sphere {
 enum class Reconstruction {
   constant,  ///< evenly over the cell: the phase function is averaged over the bin
   smooth,    ///< as a smooth function over the sphere whose bin means are the histogram's: removes
-           ///< most of the error that wide bins make where phase and light peak together; weights
-           ///< may be slightly negative. Above 512 bins the same as `constant`, which is as good
-           ///< there
+             ///< most of the error that wide bins make where phase and light peak together; weights
+             ///< may be slightly negative. Above 512 bins the same as `constant`, which is as good
+             ///< there
 };
 
 /// Table of W_j(wo) = (1/A) * integral over cell j of f(w, wo) dw [1/sr], the phase function

@@ -1,2 +1,2 @@
-#include <nanoflann.hpp>
 #include <spdlog/spdlog.h>
+#include <nanoflann.hpp>

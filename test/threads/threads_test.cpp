@@ -1,0 +1,101 @@
+// What threads share: sums, loops, limits. Small enough to run under the thread sanitizer, for
+// which this program is built from the core alone.
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <stdexcept>
+#include <thread>
+#include <vector>
+
+#include "photosphere/core/fixed_point.h"
+#include "photosphere/core/log.h"
+#include "photosphere/core/parallel.h"
+
+namespace photosphere {
+namespace {
+
+constexpr std::size_t kItems = 20'000;
+
+TEST(Threads, SumsThatManyThreadsAddToLoseNothing) {
+  std::vector<std::int64_t> sums(7, 0);
+  std::vector<std::thread> threads;
+  for (int t = 0; t < 4; ++t)
+    threads.emplace_back([&] {
+      for (std::size_t i = 0; i < kItems; ++i)
+        addChecked(sums[i % sums.size()], static_cast<std::int64_t>(i));
+    });
+  for (std::thread& thread : threads)
+    thread.join();
+  std::int64_t total = 0;
+  for (const std::int64_t sum : sums)
+    total += sum;
+  EXPECT_EQ(total, static_cast<std::int64_t>(4 * (kItems * (kItems - 1) / 2)));
+}
+
+TEST(Threads, LoopVisitsEveryItemOnceAndItsWritesAreSeenAfterIt) {
+  const ThreadLimit limit(4);
+  std::vector<int> visits(kItems, 0);  // plain ints: ranges are disjoint, the loop's end joins them
+  for (int round = 1; round <= 20; ++round) {
+    parallelFor(kItems, 64, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i)
+        ++visits[i];
+    });
+    for (std::size_t i = 0; i < kItems; ++i)
+      ASSERT_EQ(visits[i], round) << i;
+  }
+}
+
+TEST(Threads, LoopsInsideLoopsJoinToo) {
+  const ThreadLimit limit(4);
+  std::vector<std::int64_t> sums(16, 0);
+  parallelFor(sums.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i)
+      parallelFor(1000, 50, [&, i](std::size_t from, std::size_t to) {
+        addChecked(sums[i], static_cast<std::int64_t>(to - from));
+      });
+  });
+  for (const std::int64_t sum : sums)
+    EXPECT_EQ(sum, 1000);
+}
+
+TEST(Threads, AnExceptionInALoopReachesTheCaller) {
+  const ThreadLimit limit(4);
+  EXPECT_THROW(parallelFor(kItems, 16,
+                           [](std::size_t begin, std::size_t end) {
+                             if (begin <= kItems / 2 && kItems / 2 < end)
+                               throw std::runtime_error("stop");
+                           }),
+               std::runtime_error);
+}
+
+TEST(Threads, LogLevelsMayChangeWhileOthersLog) {
+  const log::Level before = log::level();
+  log::setLevel(log::Level::error);
+  std::vector<std::thread> threads;
+  for (int t = 0; t < 4; ++t)
+    threads.emplace_back([] {
+      for (int i = 0; i < 1000; ++i) {
+        log::setLevel(log::Level::error);
+        log::info("nobody sees this {}", i);
+      }
+    });
+  for (std::thread& thread : threads)
+    thread.join();
+  EXPECT_EQ(log::level(), log::Level::error);
+  log::setLevel(before);
+}
+
+// Run by its own CTest entry, which expects the thread sanitizer to object.
+TEST(Threads, DISABLED_PlantedRace) {
+  const ThreadLimit limit(4);
+  volatile std::int64_t sum = 0;
+  parallelFor(kItems, 16, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i)
+      sum = sum + 1;
+  });
+  SUCCEED() << sum;
+}
+
+}  // namespace
+}  // namespace photosphere
