@@ -8,6 +8,7 @@
 #include "photosphere/render/integrator.h"
 #include "support/media.h"
 #include "support/slab_table.h"
+#include "support/support.h"
 
 namespace photosphere::test {
 
@@ -26,6 +27,7 @@ template <class Pick>
 Estimate estimate(const render::Integrator& integrator, const Vec3d& origin, const Vec3f& direction,
                   std::size_t count, const Pick& pick) {
   constexpr std::size_t kChunk = 4096;
+  if (kSanitized) count /= 20;
   const std::size_t chunks = (count + kChunk - 1) / kChunk;
   std::vector<double> sums(chunks), squares(chunks);
   parallelFor(chunks, 1, [&](std::size_t begin, std::size_t end) {
@@ -78,7 +80,7 @@ TEST(PathTracing, FurnaceByNextEventIsOneWithinFourStandardErrors) {
     const Estimate e = estimate(*path, Vec3d(d) * -2.0, d, 100000, total);
     EXPECT_NEAR(e.mean, 1.0, 4 * e.error);
     EXPECT_GT(e.error, 0.0);
-    EXPECT_LT(e.error, 0.02);
+    EXPECT_LT(e.error, kSanitized ? 0.1 : 0.02);
   }
 }
 
@@ -123,7 +125,7 @@ TEST_P(SlabRadiance, MatchesTheReferenceWithinFourStandardErrors) {
     const Vec3d entry(0, 0, top ? c.tau / 2 : -c.tau / 2);
     const Estimate e = estimate(*path, entry - Vec3d(d), d, 120000, total);
     EXPECT_NEAR(e.mean, row.value, 4 * e.error) << row.quantity << " mu " << row.at;
-    EXPECT_LT(e.error, 0.2 * row.value) << row.quantity << " mu " << row.at;
+    EXPECT_LT(e.error, (kSanitized ? 1.0 : 0.2) * row.value) << row.quantity << " mu " << row.at;
     ++checked;
   }
   EXPECT_EQ(checked, 8);

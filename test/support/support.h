@@ -12,6 +12,14 @@
 
 namespace photosphere::test {
 
+/// True in builds that a sanitizer slows down ten times: tests that average over many random paths
+/// then run the same code on fewer.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+inline constexpr bool kSanitized = true;
+#else
+inline constexpr bool kSanitized = false;
+#endif
+
 /// A folder of its own that disappears with the object.
 class TemporaryFolder {
  public:

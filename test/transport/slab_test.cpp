@@ -74,7 +74,7 @@ TEST_P(Slab, ReflectanceAndTransmittance) {
   lights.push_back(std::make_unique<InjectionLight>(c.tau / 2, c.illumination == "diffuse"));
   LeaveCounter sink;
   transport::TraceOptions options;
-  options.photons = 1'000'000;
+  options.photons = kSanitized ? 20'000 : 1'000'000;
   options.key = RandomKey::fromSeed(7, 0);
   const transport::TraceStatistics stats = tracePhotons(medium, lights, options, sink);
   EXPECT_EQ(stats.majorantViolations, 0u);

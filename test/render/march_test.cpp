@@ -1,0 +1,130 @@
+// The march against closed forms and path tracing.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "support/frames.h"
+#include "support/support.h"
+
+namespace photosphere::test {
+
+namespace {
+
+using render::IntegratorCounters;
+using render::RayRadiance;
+using render::ShadowMode;
+
+// A homogeneous cube lit from straight above, seen along x: every point of the ray has the same
+// depth below the lit face, so single scattering has a closed form.
+double boxSingle(double sigma, double albedo, double depth, double length) {
+  return albedo / (4 * kPi) * std::exp(-sigma * depth) * (1 - std::exp(-sigma * length));
+}
+
+class BoxSingle : public testing::TestWithParam<ShadowMode> {};
+
+TEST_P(BoxSingle, MatchesTheClosedForm) {
+  for (const double sigma : {0.01, 1.0, 4.0}) {
+    const transport::Medium medium =
+        makeMedium(boxVolume(Vec3d(2.0), Vec3i(32), {0.8, 0.0, sigma}));
+    transport::LightList lights;
+    lights.push_back(
+        makeLight("directional", {{"position", "[0, 0, 1]"}, {"target", "[0, 0, 0]"}}));
+    const render::Shadows shadows(medium, lights, GetParam(), 0.0625f, 0);
+    const auto march = render::makeMarchIntegrator(medium, lights, shadows, nullptr, {});
+    IntegratorCounters counters;
+    for (const double z : {0.8, 0.0, -0.7}) {
+      double sum = 0;
+      const int n = GetParam() == ShadowMode::track ? 400 : 16;
+      for (int i = 0; i < n; ++i) {
+        Rng rng(RandomKey::fromSeed(1, 0), RandomStream::camera, static_cast<std::uint64_t>(i));
+        sum += static_cast<double>(
+            march->radiance(Vec3d(-9, 0.1, z), Vec3f(1, 0, 0), rng, counters).single.x);
+      }
+      const double exact = boxSingle(sigma, 0.8, 1 - z, 2);
+      EXPECT_NEAR(sum / n, exact, (GetParam() == ShadowMode::track ? 0.04 : 0.004) * exact)
+          << "sigma " << sigma << ", z " << z;
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Shadows, BoxSingle,
+                         testing::Values(ShadowMode::grid, ShadowMode::march, ShadowMode::track));
+
+TEST(March, TransmittanceDoesNotDependOnTheStep) {
+  const transport::Medium medium = makeMedium(boxVolume(Vec3d(2.0), Vec3i(16), {0.8, 0.0, 1.5}));
+  const transport::LightList lights;
+  const render::Shadows shadows(medium, lights, ShadowMode::march, 0.1f, 0);
+  for (const float step : {0.1f, 1.0f, 7.0f}) {
+    render::MarchOptions options;
+    options.step = step;
+    const auto march = render::makeMarchIntegrator(medium, lights, shadows, nullptr, options);
+    IntegratorCounters counters;
+    Rng rng(RandomKey::fromSeed(1, 0), RandomStream::camera, 0);
+    const RayRadiance r = march->radiance(Vec3d(-9, 0.1, 0.2), Vec3f(1, 0, 0), rng, counters);
+    EXPECT_NEAR(r.transmittance.x, std::exp(-3.0f), 1e-4f) << step;
+    EXPECT_NEAR(r.depth / r.opacity, 8 + (1 - 4 * std::exp(-3.0)) / (1.5 * (1 - std::exp(-3.0))),
+                0.05);
+  }
+}
+
+// Eye and lamp inside the smoke, where 1/d^2 and directions change quickly.
+void compareInside(TestScene scene, double bound) {
+  const render::FrameLayers truth = renderPath(scene, kSanitized ? 2 : 400, 1);
+  estimators::LightFieldLayout layout;
+  layout.channels = 1;
+  layout.lightVoxel = 1.0;
+  const PhotosphereFrame frame =
+      renderPhotosphere(scene, layout, kSanitized ? 2000 : 500'000, 5, 16);
+  EXPECT_EQ(frame.layers.nanSamples + frame.layers.negativeSamples + truth.nanSamples, 0u);
+  if (kSanitized) return;
+  double image = 0, reference = 0;
+  for (std::size_t i = 0; i < truth.beauty.size(); ++i) {
+    image += static_cast<double>(frame.layers.beauty[i].y);
+    reference += static_cast<double>(truth.beauty[i].y);
+  }
+  std::printf("  mean ratio %.4f\n", image / reference);
+  EXPECT_NEAR(image / reference, 1.0, bound);
+}
+
+TEST(March, EyeInsideTheSmoke) {
+  TestScene scene = sphereScene(4, 0.9, 0.4, 32, 32);
+  scene.camera = perspectiveCamera({0.05, -0.2, 0.03}, 60, 32);
+  compareInside(std::move(scene), 0.03);
+}
+
+TEST(March, LampInsideTheSmoke) {
+  TestScene scene = sphereScene(4, 0.9, 0.4, 32, 32);
+  scene.lights.clear();
+  scene.lights.push_back(
+      makeLight("point", {{"position", "[0.1, 0.05, 0.12]"}, {"intensity", "1"}}));
+  compareInside(std::move(scene), 0.03);
+}
+
+TEST(Frame, CropIsPartOfTheWhole) {
+  const TestScene scene = sphereScene(6, 0.9, 0.3, 24, 40);
+  const auto path = render::makePathIntegrator(*scene.medium, scene.lights, {});
+  render::FrameOptions options;
+  options.crop = {Vec2i(0), Vec2i(40)};
+  const render::FrameLayers whole = renderFrame(*scene.camera, *path, options);
+  options.crop = {Vec2i(11, 7), Vec2i(30, 29)};
+  const render::FrameLayers part = renderFrame(*scene.camera, *path, options);
+  for (int y = 0; y < part.height(); ++y)
+    for (int x = 0; x < part.width(); ++x)
+      ASSERT_EQ(part.beauty[static_cast<std::size_t>(y * part.width() + x)],
+                whole.beauty[static_cast<std::size_t>((y + 7) * 40 + x + 11)]);
+}
+
+TEST(PixelFilter, WeightsFallToZeroAtTheirRadius) {
+  for (const auto kind : {render::FilterKind::box, render::FilterKind::triangle,
+                          render::FilterKind::blackmanHarris}) {
+    const render::PixelFilter filter(kind, 0);
+    EXPECT_GT(filter.weight({0, 0}), 0.0f);
+    EXPECT_GE(filter.weight({0, 0}), filter.weight({0.4, 0.2}));
+    EXPECT_EQ(filter.weight({filter.radius() + 0.01, 0}), 0.0f);
+  }
+}
+
+}  // namespace
+
+}  // namespace photosphere::test
