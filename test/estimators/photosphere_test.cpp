@@ -64,6 +64,12 @@ struct AgreementCase {
   Basis basis;
 };
 
+// What GoogleTest prints of a case.
+std::ostream& operator<<(std::ostream& out, const AgreementCase& c) {
+  return out << c.scene << (c.carrier == Carrier::voxels ? " voxels" : " particles")
+             << (c.basis == Basis::view ? " view" : " histogram");
+}
+
 class Agreement : public testing::TestWithParam<AgreementCase> {};
 
 TEST_P(Agreement, WithPathTracing) {

@@ -49,7 +49,7 @@ TEST(Bricks, SampleAsOpenVdbInterpolates) {
         << p.x << ' ' << p.y << ' ' << p.z;
     smoky += expected > 0;
   }
-  EXPECT_GT(smoky, 5000);
+  EXPECT_GT(smoky, 1000);
 }
 
 TEST(Bricks, OutsideAndNanAreZero) {
