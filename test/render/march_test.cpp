@@ -45,8 +45,11 @@ TEST_P(BoxSingle, MatchesTheClosedForm) {
             march->radiance(Vec3d(-9, 0.1, z), Vec3f(1, 0, 0), rng, counters).single.x);
       }
       const double exact = boxSingle(sigma, 0.8, 1 - z, 2);
-      EXPECT_NEAR(sum / n, exact, (GetParam() == ShadowMode::track ? 0.04 : 0.01) * exact)
-          << "sigma " << sigma << ", z " << z;
+      // The grid's outermost nodes lie on the cube's sharp side, where no smoke has a side.
+      const double bound = GetParam() == ShadowMode::track  ? 0.04
+                           : GetParam() == ShadowMode::grid ? 0.02
+                                                            : 0.004;
+      EXPECT_NEAR(sum / n, exact, bound * exact) << "sigma " << sigma << ", z " << z;
     }
   }
 }
