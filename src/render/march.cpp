@@ -88,7 +88,12 @@ class MarchIntegrator final : public Integrator {
     const float t = 0.5f * (t0 + t1);
     const Vec3f p = ray.origin + ray.direction * t;
     Coefficients c;
-    m_medium.coefficients(p, c);
+    if (const Rgb* albedo = m_medium.uniformAlbedo()) {
+      c.extinction = m_medium.extinction(p);
+      c.scattering[0] = c.extinction * *albedo;
+    } else {
+      m_medium.coefficients(p, c);
+    }
     if (!(c.extinction > 0.0f)) return transmittance;
     const float depth = c.extinction * dx;
     // (1 - exp(-x)) / x, its series where the difference would cancel.

@@ -10,6 +10,17 @@ using transport::Medium;
 using transport::Segment;
 using Field = volume::BrickField<float>;
 
+namespace {
+
+// True when one of the eight voxels around a node holds smoke.
+bool besideSmoke(const transport::SupportLattice& lattice, const Vec3i& node) {
+  for (int corner = 0; corner < 8; ++corner)
+    if (lattice.number(node - Vec3i(corner & 1, corner >> 1 & 1, corner >> 2)) >= 0) return true;
+  return false;
+}
+
+}  // namespace
+
 Shadows::Shadows(const Medium& medium, const transport::LightList& lights, ShadowMode mode,
                  float step, std::uint64_t budgetBytes)
     : m_medium(&medium), m_mode(mode), m_step(step), m_tables(lights.size()) {
@@ -32,8 +43,12 @@ Shadows::Shadows(const Medium& medium, const transport::LightList& lights, Shado
       for (int z = 0; z < Field::kNodes; ++z)
         for (int y = 0; y < Field::kNodes; ++y)
           for (int x = 0; x < Field::kNodes; ++x) {
-            const Vec3d node(brick.x * 8 + x, brick.y * 8 + y, brick.z * 8 + z);
-            const Vec3d p = lattice.origin() + node * pitch;
+            const Vec3i node = brick * 8 + Vec3i(x, y, z);
+            if (!besideSmoke(lattice, node)) {
+              *depth++ = 0.0f;  // no lookup in smoke reads this node
+              continue;
+            }
+            const Vec3d p = lattice.origin() + Vec3d(node) * pitch;
             const lights::Illumination in = light.illuminate(Vec3f(p), Vec2f(0.5f));
             lit = lit || maxComponent(in.irradiance) > 0.0f;
             const Segment toLight =
