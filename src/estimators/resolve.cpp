@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <optional>
 
 #include "deposit.h"
 #include "photosphere/core/error.h"
@@ -31,8 +32,9 @@ Vec3f carrierPosition(const LightField& field, std::size_t i) {
 }
 
 // Folds histogram and phase into one colour per carrier; the view basis holds that already.
+// `table` is the phase function's; used by the histogram basis alone.
 Colours foldPhase(const LightField& field, const View& view, std::size_t set, int phaseIndex,
-                  const phase::HenyeyGreenstein& phase) {
+                  const sphere::BinWeights* table) {
   const LightFieldLayout& layout = field.layout;
   const auto stride = static_cast<std::size_t>(layout.valuesPerCarrier());
   const std::size_t offset = set * static_cast<std::size_t>(layout.setSize());
@@ -44,16 +46,11 @@ Colours foldPhase(const LightField& field, const View& view, std::size_t set, in
                               layout.channels);
     return colours;
   }
-  const sphere::Partition partition(layout.rows);
-  const sphere::BinWeights table(
-      partition,
-      [&](const Vec3f& w, const Vec3f& wo) { return static_cast<double>(phase.evaluate(w, wo)); },
-      phase.g(), sphere::Reconstruction::smooth);
   const int bins = layout.bins();
   parallelFor(colours.size(), 1024, [&](std::size_t begin, std::size_t end) {
     std::vector<float> weights(static_cast<std::size_t>(bins));
     for (std::size_t i = begin; i < end; ++i) {
-      table.weights(view.toEye(carrierPosition(field, i)), weights.data());
+      table->weights(view.toEye(carrierPosition(field, i)), weights.data());
       const float* values = field.values.data() + i * stride + offset;
       Rgb sum(0.0f);
       for (int j = 0; j < bins; ++j)
@@ -65,6 +62,15 @@ Colours foldPhase(const LightField& field, const View& view, std::size_t set, in
     }
   });
   return colours;
+}
+
+std::optional<sphere::BinWeights> binWeights(const LightFieldLayout& layout,
+                                             const phase::HenyeyGreenstein& phase) {
+  if (layout.basis != Basis::histogram) return std::nullopt;
+  return sphere::BinWeights(
+      sphere::Partition(layout.rows),
+      [&](const Vec3f& w, const Vec3f& wo) { return static_cast<double>(phase.evaluate(w, wo)); },
+      phase.g(), sphere::Reconstruction::smooth);
 }
 
 struct Tap {
@@ -276,12 +282,22 @@ class ResolvedField final : public InscatterSource {
         field.layout.carrier == Carrier::particles ? own : field.lattice;
     m_inverseEdge = static_cast<float>(1.0 / lattice.edge());
     m_firstNode = Vec3f(lattice.origin() + 0.5 * lattice.edge());
-    for (std::size_t set = 0; set < (m_unscattered ? 2u : 1u); ++set)
-      for (int k = 0; k < m_phases; ++k) {
+    std::optional<ParticleGather> gather;
+    if (field.layout.carrier == Carrier::particles) gather.emplace(field, medium, lattice);
+    const std::size_t sets = m_unscattered ? 2 : 1;
+    const auto phases = static_cast<std::size_t>(m_phases);
+    m_fields.resize(sets * phases);
+    for (std::size_t k = 0; k < phases; ++k) {
+      const auto table = binWeights(field.layout, medium.phases()[k]);
+      for (std::size_t set = 0; set < sets; ++set) {
         const Colours folded =
-            foldPhase(field, view, set, k, medium.phases()[static_cast<std::size_t>(k)]);
-        m_fields.push_back(layOut(lattice, spread(medium, field, lattice, folded)));
+            foldPhase(field, view, set, static_cast<int>(k), table ? &*table : nullptr);
+        m_fields[set * phases + k] = layOut(
+            lattice, gather
+                         ? spreadParticles(field, lattice, *gather, folded)
+                         : smoothVoxels(lattice, folded, field.layout.kernel, field.layout.radius));
       }
+    }
   }
 
   Inscatter at(const Vec3f& p, const Vec3f&, const Coefficients& c) const override {
@@ -300,13 +316,10 @@ class ResolvedField final : public InscatterSource {
   bool carriesUnscattered() const override { return m_unscattered; }
 
  private:
-  // From the carriers to the voxels that lookups read.
-  Colours spread(const Medium& medium, const LightField& field, const SupportLattice& lattice,
-                 const Colours& folded) const {
+  // From particles to the voxels that lookups read.
+  Colours spreadParticles(const LightField& field, const SupportLattice& lattice,
+                          const ParticleGather& gather, const Colours& folded) const {
     const LightFieldLayout& layout = field.layout;
-    if (layout.carrier == Carrier::voxels)
-      return smoothVoxels(lattice, folded, layout.kernel, layout.radius);
-    const ParticleGather gather(field, medium, lattice);
     if (layout.holdsPower())
       return layout.energy == EnergyRule::gather ? gather.gatherRule(folded)
                                                  : gather.scatterRule(folded);

@@ -4,17 +4,9 @@
 
 #include <cmath>
 
-#include "photosphere/core/types.h"
+#include "photosphere/core/exact_sine.h"
 
 namespace photosphere::lights {
-
-/// sin(x) for x in [0, pi / 2], by its Taylor series (the 12th term is below 1e-18).
-inline double exactSin(double x) {
-  double sum = 0;
-  for (int n = 23; n > 1; n -= 2)
-    sum = (1 + sum) * (-x * x / (n * (n - 1)));
-  return x * (1 + sum);
-}
 
 /// 1 - cos(x) for x in [0, pi], without cancellation for small x.
 inline double oneMinusCos(double x) {

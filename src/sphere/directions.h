@@ -4,24 +4,16 @@
 
 #include <cmath>
 
+#include "photosphere/core/exact_sine.h"
 #include "photosphere/core/types.h"
 
 namespace photosphere::sphere {
-
-/// sin(x) for x in [0, pi / 2], by its Taylor series (the 12th term is below 1e-18).
-inline double octantSin(double x) {
-  double sum = 0;
-  for (int n = 23; n > 1; n -= 2)
-    sum = (1 + sum) * (-x * x / (n * (n - 1)));
-  return x * (1 + sum);
-}
 
 /// @param s        sqrt(1 - z) in [0, 1]; rows of the partition are even in it
 /// @param azimuth  part of the octant's quarter turn, in [0, 1]
 inline Vec3d octantDirection(double s, double azimuth) {
   const double sine = s * std::sqrt(2 - s * s);
-  return {sine * octantSin((1 - azimuth) * kPi / 2), sine * octantSin(azimuth * kPi / 2),
-          1 - s * s};
+  return {sine * exactSin((1 - azimuth) * kPi / 2), sine * exactSin(azimuth * kPi / 2), 1 - s * s};
 }
 
 /// A vector with the signs of an octant.

@@ -16,35 +16,27 @@ class Marks {
  public:
   explicit Marks(const Vec3i& bricks)
       : m_bricks(bricks),
-        table(static_cast<std::size_t>(bricks.x) * static_cast<std::size_t>(bricks.y) *
-                  static_cast<std::size_t>(bricks.z),
-              -1) {}
+        m_table(static_cast<std::size_t>(bricks.x) * static_cast<std::size_t>(bricks.y) *
+                    static_cast<std::size_t>(bricks.z),
+                -1) {}
 
   void mark(const Vec3i& v) {
     const Vec3i b(v.x >> 3, v.y >> 3, v.z >> 3);
-    std::int32_t& brick =
-        table[(static_cast<std::size_t>(b.z) * static_cast<std::size_t>(m_bricks.y) +
-               static_cast<std::size_t>(b.y)) *
-                  static_cast<std::size_t>(m_bricks.x) +
-              static_cast<std::size_t>(b.x)];
+    std::int32_t& brick = m_table[tableIndex(b)];
     if (brick < 0) {
-      brick = static_cast<std::int32_t>(masks.size());
-      masks.emplace_back();
+      brick = static_cast<std::int32_t>(m_masks.size());
+      m_masks.emplace_back();
     }
-    masks[static_cast<std::size_t>(brick)][static_cast<std::size_t>(v.z & 7)] |=
+    m_masks[static_cast<std::size_t>(brick)][static_cast<std::size_t>(v.z & 7)] |=
         std::uint64_t{1} << ((v.y & 7) * 8 + (v.x & 7));
   }
   bool marked(const Vec3i& v) const {
     if (v.x < 0 || v.y < 0 || v.z < 0) return false;
     const Vec3i b(v.x >> 3, v.y >> 3, v.z >> 3);
     if (b.x >= m_bricks.x || b.y >= m_bricks.y || b.z >= m_bricks.z) return false;
-    const std::int32_t brick =
-        table[(static_cast<std::size_t>(b.z) * static_cast<std::size_t>(m_bricks.y) +
-               static_cast<std::size_t>(b.y)) *
-                  static_cast<std::size_t>(m_bricks.x) +
-              static_cast<std::size_t>(b.x)];
+    const std::int32_t brick = m_table[tableIndex(b)];
     return brick >= 0 &&
-           (masks[static_cast<std::size_t>(brick)][static_cast<std::size_t>(v.z & 7)] >>
+           (m_masks[static_cast<std::size_t>(brick)][static_cast<std::size_t>(v.z & 7)] >>
             ((v.y & 7) * 8 + (v.x & 7))) &
                1;
   }
@@ -53,13 +45,9 @@ class Marks {
     for (int z = 0; z < m_bricks.z; ++z)
       for (int y = 0; y < m_bricks.y; ++y)
         for (int x = 0; x < m_bricks.x; ++x) {
-          const std::int32_t brick =
-              table[(static_cast<std::size_t>(z) * static_cast<std::size_t>(m_bricks.y) +
-                     static_cast<std::size_t>(y)) *
-                        static_cast<std::size_t>(m_bricks.x) +
-                    static_cast<std::size_t>(x)];
+          const std::int32_t brick = m_table[tableIndex({x, y, z})];
           if (brick < 0) continue;
-          const Mask& mask = masks[static_cast<std::size_t>(brick)];
+          const Mask& mask = m_masks[static_cast<std::size_t>(brick)];
           for (int i = 0; i < 512; ++i)
             if (mask[static_cast<std::size_t>(i >> 6)] >> (i & 63) & 1)
               visit(Vec3i(x * 8 + (i & 7), y * 8 + (i >> 3 & 7), z * 8 + (i >> 6)));
@@ -67,11 +55,15 @@ class Marks {
   }
 
  private:
+  std::size_t tableIndex(const Vec3i& b) const {
+    return (static_cast<std::size_t>(b.z) * static_cast<std::size_t>(m_bricks.y) +
+            static_cast<std::size_t>(b.y)) *
+               static_cast<std::size_t>(m_bricks.x) +
+           static_cast<std::size_t>(b.x);
+  }
   Vec3i m_bricks;
-
- public:
-  std::vector<std::int32_t> table;
-  std::vector<Mask> masks;
+  std::vector<std::int32_t> m_table;
+  std::vector<Mask> m_masks;
 };
 
 void checkTable(const Vec3d& bricks) {
@@ -90,7 +82,7 @@ void markSupport(const Medium& medium, const Vec3d& origin, double edge, Marks& 
     if (field.empty() || !(v.densityScale > 0)) continue;
     const Mat4d& m = v.localFromNode;
     const Vec3d axes = glm::abs(Vec3d(m[0])) + glm::abs(Vec3d(m[1])) + glm::abs(Vec3d(m[2]));
-    auto markCell = [&](const Vec3i& cell, int size) {
+    volume::forEachCell(field, [&](const Vec3i& cell, int size, float) {
       const Vec3d center = (transformPoint(m, Vec3d(cell) + 0.5 * size) - origin) / edge;
       const Vec3d half = axes * (0.5 * size / edge) * (1 - 1e-6);
       const Vec3i lo = Vec3i(glm::floor(center - half)), hi = Vec3i(glm::floor(center + half));
@@ -98,27 +90,7 @@ void markSupport(const Medium& medium, const Vec3d& origin, double edge, Marks& 
         for (int y = lo.y; y <= hi.y; ++y)
           for (int x = lo.x; x <= hi.x; ++x)
             marks.mark({x, y, z});
-    };
-    const Vec3i& bricks = field.bricks();
-    for (int bz = 0; bz < bricks.z; ++bz)
-      for (int by = 0; by < bricks.y; ++by)
-        for (int bx = 0; bx < bricks.x; ++bx) {
-          const std::int32_t brick = field.brickAt({bx, by, bz});
-          if (brick < 0) continue;
-          if (field.isConstant(brick)) {
-            markCell({bx * 8, by * 8, bz * 8}, 8);
-            continue;
-          }
-          const float* n = field.nodes(brick);
-          for (int z = 0; z < 8; ++z)
-            for (int y = 0; y < 8; ++y)
-              for (int x = 0; x < 8; ++x) {
-                const float* c = n + (z * 9 + y) * 9 + x;
-                if (c[0] > 0 || c[1] > 0 || c[9] > 0 || c[10] > 0 || c[81] > 0 || c[82] > 0 ||
-                    c[90] > 0 || c[91] > 0)
-                  markCell({bx * 8 + x, by * 8 + y, bz * 8 + z}, 1);
-              }
-        }
+    });
   }
 }
 

@@ -6,37 +6,6 @@ namespace {
 
 using Field = BrickField<float>;
 
-// Calls visit(cell minimum, cells along an edge, largest value) for every brick or voxel cell whose
-// interpolant can differ from zero.
-template <class Visit>
-void forEachCell(const Field& field, const Visit& visit) {
-  if (field.empty()) return;
-  const Vec3i& bricks = field.bricks();
-  for (int bz = 0; bz < bricks.z; ++bz)
-    for (int by = 0; by < bricks.y; ++by)
-      for (int bx = 0; bx < bricks.x; ++bx) {
-        const std::int32_t brick = field.brickAt({bx, by, bz});
-        if (brick < 0) continue;
-        const float* n = field.nodes(brick);
-        const Vec3i first(bx * 8, by * 8, bz * 8);
-        if (field.isConstant(brick)) {
-          visit(first, 8, n[0]);
-          continue;
-        }
-        constexpr int dy = Field::kNodes, dz = Field::kNodes * Field::kNodes;
-        for (int z = 0; z < 8; ++z)
-          for (int y = 0; y < 8; ++y)
-            for (int x = 0; x < 8; ++x) {
-              const float* c = n + z * dz + y * dy + x;
-              const float low = std::max(std::max(c[0], c[1]), std::max(c[dy], c[dy + 1]));
-              const float high =
-                  std::max(std::max(c[dz], c[dz + 1]), std::max(c[dz + dy], c[dz + dy + 1]));
-              const float largest = std::max(low, high);
-              if (largest > 0) visit(first + Vec3i(x, y, z), 1, largest);
-            }
-      }
-}
-
 // Half extents, in local space, of a cube with this many node spacings along its edge.
 Vec3d halfExtents(const Mat4d& m, double edge) {
   return 0.5 * edge * (glm::abs(Vec3d(m[0])) + glm::abs(Vec3d(m[1])) + glm::abs(Vec3d(m[2])));

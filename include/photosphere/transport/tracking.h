@@ -45,104 +45,84 @@ struct Collision {
   bool happened() const { return distance < kInfinity; }
 };
 
+/// Calls visit(distance, sigma_t, majorant) for the tentative collisions of a ray, drawn against
+/// the local majorants in order, until it returns false: the walk that delta and ratio tracking
+/// share.
+template <class Visit>
+inline void forEachTentative(const Medium& medium, const Vec3f& o, const Vec3f& d, float length,
+                             Rng& rng, TrackingCounters& counters, const Visit& visit) {
+  float tau = -fastLog(rng.uniformPositive());
+  for (volume::MajorantGrid::Walk walk(medium.majorants(), o, d, 0.0f, length); !walk.done();
+       walk.advance()) {
+    const float majorant = walk.majorant();
+    const float end = walk.end();
+    float t = walk.begin();
+    while (true) {
+      const float available = (end - t) * majorant;
+      if (!(tau < available)) {
+        tau -= available;
+        break;
+      }
+      t += tau / majorant;
+      const float sigma = medium.extinction(o + d * t);
+      ++counters.lookups;
+      if (sigma > majorant * 1.001f) ++counters.majorantViolations;
+      if (!visit(t, sigma, majorant)) return;
+      tau = -fastLog(rng.uniformPositive());
+    }
+  }
+}
+
+/// The factor of one tentative collision in a ratio-tracked transmittance, with roulette once that
+/// is small: survival in proportion to what is left keeps it unbiased and ends dark rays.
+/// @return false when the ray has ended dark
+inline bool attenuate(float& transmittance, float sigma, float majorant, Rng& rng) {
+  transmittance *= glm::max(0.0f, 1.0f - sigma / majorant);
+  if (transmittance < 0.1f) {
+    if (!(rng.uniform() * 0.1f < transmittance)) {
+      transmittance = 0.0f;
+      return false;
+    }
+    transmittance = 0.1f;
+  }
+  return true;
+}
+
 /// The first real collision (Woodcock delta tracking over local majorants).
 inline Collision sampleCollision(const Medium& medium, const Vec3f& o, const Vec3f& d, float length,
                                  Rng& rng, TrackingCounters& counters) {
-  volume::MajorantGrid::Walk walk(medium.majorants(), o, d, 0.0f, length);
-  float tau = -fastLog(rng.uniformPositive());
-  while (!walk.done()) {
-    const float majorant = walk.majorant();
-    const float end = walk.end();
-    float t = walk.begin();
-    while (true) {
-      const float available = (end - t) * majorant;
-      if (!(tau < available)) {
-        tau -= available;
-        break;
-      }
-      t += tau / majorant;
-      const float sigma = medium.extinction(o + d * t);
-      ++counters.lookups;
-      if (sigma > majorant * 1.001f) ++counters.majorantViolations;
-      if (rng.uniform() * majorant < sigma) return {t, sigma};
-      tau = -fastLog(rng.uniformPositive());
-    }
-    walk.advance();
-  }
-  return {};
+  Collision hit;
+  forEachTentative(medium, o, d, length, rng, counters, [&](float t, float sigma, float majorant) {
+    const bool real = rng.uniform() * majorant < sigma;
+    if (real) hit = {t, sigma};
+    return !real;
+  });
+  return hit;
 }
 
-/// The first real collision and, from the same tentative ones, the ratio-tracked transmittance of
-/// the whole ray: both unbiased, and correlated with each other.
+/// Unbiased transmittance along a ray (ratio tracking, Novak et al. 2014).
+inline float trackTransmittance(const Medium& medium, const Vec3f& o, const Vec3f& d, float length,
+                                Rng& rng, TrackingCounters& counters) {
+  float transmittance = 1.0f;
+  forEachTentative(medium, o, d, length, rng, counters, [&](float, float sigma, float majorant) {
+    return attenuate(transmittance, sigma, majorant, rng);
+  });
+  return transmittance;
+}
+
+/// The first real collision and, from the same tentative ones, the transmittance of the whole ray:
+/// both unbiased, and correlated with each other.
 inline Collision sampleCollisionAndTransmittance(const Medium& medium, const Vec3f& o,
                                                  const Vec3f& d, float length, Rng& rng,
                                                  TrackingCounters& counters, float& transmittance) {
-  volume::MajorantGrid::Walk walk(medium.majorants(), o, d, 0.0f, length);
   Collision first;
   transmittance = 1.0f;
-  float tau = -fastLog(rng.uniformPositive());
-  for (; !walk.done(); walk.advance()) {
-    const float majorant = walk.majorant();
-    const float end = walk.end();
-    float t = walk.begin();
-    while (true) {
-      const float available = (end - t) * majorant;
-      if (!(tau < available)) {
-        tau -= available;
-        break;
-      }
-      t += tau / majorant;
-      const float sigma = medium.extinction(o + d * t);
-      ++counters.lookups;
-      if (sigma > majorant * 1.001f) ++counters.majorantViolations;
-      if (!first.happened() && rng.uniform() * majorant < sigma) first = {t, sigma};
-      transmittance *= glm::max(0.0f, 1.0f - sigma / majorant);
-      if (transmittance < 0.1f) {
-        if (!(rng.uniform() * 0.1f < transmittance)) {
-          transmittance = 0.0f;
-          if (first.happened()) return first;
-        } else {
-          transmittance = 0.1f;
-        }
-      }
-      tau = -fastLog(rng.uniformPositive());
-    }
-  }
+  forEachTentative(medium, o, d, length, rng, counters, [&](float t, float sigma, float majorant) {
+    if (!first.happened() && rng.uniform() * majorant < sigma) first = {t, sigma};
+    // A ray that has ended dark walks on only until it has its collision.
+    return attenuate(transmittance, sigma, majorant, rng) || !first.happened();
+  });
   return first;
-}
-
-/// Unbiased transmittance along a ray (ratio tracking, Novak et al. 2014), with roulette once it is
-/// small.
-inline float trackTransmittance(const Medium& medium, const Vec3f& o, const Vec3f& d, float length,
-                                Rng& rng, TrackingCounters& counters) {
-  volume::MajorantGrid::Walk walk(medium.majorants(), o, d, 0.0f, length);
-  float transmittance = 1.0f;
-  float tau = -fastLog(rng.uniformPositive());
-  while (!walk.done()) {
-    const float majorant = walk.majorant();
-    const float end = walk.end();
-    float t = walk.begin();
-    while (true) {
-      const float available = (end - t) * majorant;
-      if (!(tau < available)) {
-        tau -= available;
-        break;
-      }
-      t += tau / majorant;
-      const float sigma = medium.extinction(o + d * t);
-      ++counters.lookups;
-      if (sigma > majorant * 1.001f) ++counters.majorantViolations;
-      transmittance *= glm::max(0.0f, 1.0f - sigma / majorant);
-      if (transmittance < 0.1f) {
-        // Survival in proportion to what is left keeps the estimate unbiased and ends dark rays.
-        if (!(rng.uniform() * 0.1f < transmittance)) return 0.0f;
-        transmittance = 0.1f;
-      }
-      tau = -fastLog(rng.uniformPositive());
-    }
-    walk.advance();
-  }
-  return transmittance;
 }
 
 /// Optical depth along a ray by the midpoint rule.

@@ -94,6 +94,38 @@ class BrickField {
 extern template class BrickField<float>;
 extern template class BrickField<Vec4f>;
 
+/// Calls visit(lowest node, cells along an edge, largest value) for every voxel cell whose
+/// interpolant can be positive; a brick of one constant value is visited whole.
+template <class Visit>
+void forEachCell(const BrickField<float>& field, const Visit& visit) {
+  if (field.empty()) return;
+  const Vec3i& bricks = field.bricks();
+  for (int bz = 0; bz < bricks.z; ++bz)
+    for (int by = 0; by < bricks.y; ++by)
+      for (int bx = 0; bx < bricks.x; ++bx) {
+        const std::int32_t brick = field.brickAt({bx, by, bz});
+        if (brick < 0) continue;
+        const float* n = field.nodes(brick);
+        const Vec3i first(bx * 8, by * 8, bz * 8);
+        if (field.isConstant(brick)) {
+          visit(first, 8, n[0]);
+          continue;
+        }
+        constexpr int dy = BrickField<float>::kNodes,
+                      dz = BrickField<float>::kNodes * BrickField<float>::kNodes;
+        for (int z = 0; z < 8; ++z)
+          for (int y = 0; y < 8; ++y)
+            for (int x = 0; x < 8; ++x) {
+              const float* c = n + z * dz + y * dy + x;
+              const float low = std::max(std::max(c[0], c[1]), std::max(c[dy], c[dy + 1]));
+              const float high =
+                  std::max(std::max(c[dz], c[dz + 1]), std::max(c[dz + dy], c[dz + dy + 1]));
+              const float largest = std::max(low, high);
+              if (largest > 0) visit(first + Vec3i(x, y, z), 1, largest);
+            }
+      }
+}
+
 /// A scalar grid, or one component of a vector grid, as bricks. Inactive voxels count as zero.
 /// @param component  0 to 2 for a vector grid, 0 for a scalar grid
 /// @throws InputError when the grid is neither, or holds a NaN, infinite or (unless allowed)
