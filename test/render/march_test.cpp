@@ -1,5 +1,6 @@
 // The march against closed forms and path tracing.
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -71,6 +72,27 @@ TEST(March, TransmittanceDoesNotDependOnTheStep) {
     EXPECT_NEAR(r.transmittance.x, std::exp(-3.0f), 1e-4f) << step;
     EXPECT_NEAR(r.depth / r.opacity, 8 + (1 - 4 * std::exp(-3.0)) / (1.5 * (1 - std::exp(-3.0))),
                 0.05);
+  }
+}
+
+// A lamp in smoke so thin that nothing is lost, nearer to the ray than a step is long: 1/d^2
+// integrates to an arc tangent.
+TEST(March, LampNearTheRayMatchesTheClosedForm) {
+  constexpr double sigma = 1e-4, albedo = 0.8;
+  const transport::Medium medium =
+      makeMedium(boxVolume(Vec3d(2.0), Vec3i(16), {albedo, 0.0, sigma}));
+  for (const double height : {0.3, 0.05, 0.005}) {
+    transport::LightList lights;
+    lights.push_back(makeLight(
+        "point", {{"position", fmt::format("[0.21, {}, 0.2]", 0.1 + height)}, {"intensity", "1"}}));
+    const render::Shadows shadows(medium, lights, ShadowMode::march, 0.1f, 0);
+    const auto march = render::makeMarchIntegrator(medium, lights, shadows, nullptr, {});
+    IntegratorCounters counters;
+    Rng rng(RandomKey::fromSeed(1, 0), RandomStream::camera, 0);
+    const RayRadiance r = march->radiance(Vec3d(-9, 0.1, 0.2), Vec3f(1, 0, 0), rng, counters);
+    const double angle = std::atan((1 - 0.21) / height) + std::atan((1 + 0.21) / height);
+    const double exact = sigma * albedo / (4 * kPi) * angle / height;
+    EXPECT_NEAR(static_cast<double>(r.single.x), exact, 0.005 * exact) << height;
   }
 }
 

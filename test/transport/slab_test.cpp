@@ -7,6 +7,7 @@
 
 #include "photosphere/core/sampling.h"
 #include "photosphere/transport/photon_tracer.h"
+#include "support/media.h"
 #include "support/slab_table.h"
 #include "support/support.h"
 
@@ -87,6 +88,27 @@ TEST_P(Slab, ReflectanceAndTransmittance) {
   check("R", static_cast<double>(sink.reflected));
   check("T_scattered", static_cast<double>(sink.scatteredThrough));
   check("T_unscattered", static_cast<double>(sink.unscattered));
+}
+
+// Coloured smoke weighs its photons, so power leaves them at every event and must be found again.
+TEST(PhotonTracer, ColouredPowersAddUp) {
+  transport::MediumVolume volume = boxVolume(Vec3d(1.0), Vec3i(8), {1.0, 0.5, 6.0});
+  volume.albedo = Rgb(0.95f, 0.6f, 0.2f);
+  const transport::Medium medium = makeMedium(std::move(volume));
+  transport::LightList lights;
+  lights.push_back(makeLight("point", {{"position", "[3, 1, 2]"}, {"color", "[1, 2, 3]"}}));
+  LeaveCounter sink;
+  transport::TraceOptions options;
+  options.photons = 20'000;
+  const transport::TraceStatistics stats = tracePhotons(medium, lights, options, sink);
+  for (int c = 0; c < 3; ++c) {
+    EXPECT_NEAR(stats.imbalance()[c], 0.0, 1e-9 * stats.emitted[c]);
+    EXPECT_GT(stats.missed[c], 0.0);
+    EXPECT_GT(stats.absorbed[c], 0.0);
+    EXPECT_GT(stats.escaped[c], 0.0);
+  }
+  // The darker the channel, the more of its power stays.
+  EXPECT_GT(stats.absorbed.z / stats.emitted.z, 2 * stats.absorbed.x / stats.emitted.x);
 }
 
 std::vector<SlabCase> cases() {
