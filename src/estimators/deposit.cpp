@@ -18,10 +18,11 @@ std::vector<bool> wantsUnscattered(const transport::LightList& lights,
   return wants;
 }
 
-// The set a flight belongs to: 0 = light scattered before, 1 = light as its lamp sent it. -1 =
-// none: the lamp's own light is evaluated at march time.
+// The set a flight belongs to: 0 = light scattered before or emitted by the smoke, which no other
+// term carries to its next scattering; 1 = light as its lamp sent it. -1 = none: the lamp's own
+// light is evaluated at march time.
 int setOf(const Flight& flight, const std::vector<bool>& wantsUnscattered) {
-  if (flight.scatterings > 0) return 0;
+  if (flight.scatterings > 0 || flight.light == transport::kEmittedBySmoke) return 0;
   return wantsUnscattered[flight.light] ? 1 : -1;
 }
 

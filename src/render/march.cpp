@@ -27,7 +27,10 @@ class MarchIntegrator final : public Integrator {
         m_shadows(shadows),
         m_source(source),
         m_options(options),
+        m_emission(options.effects.emission ? medium.emission() : nullptr),
         m_step(static_cast<float>(medium.voxelEdge()) * options.step) {
+    if (m_emission)
+      m_step = std::min(m_step, static_cast<float>(m_emission->region().spacing) * options.step);
     const bool carried = source && source->carriesUnscattered();
     for (std::size_t i = 0; i < lights.size(); ++i)
       if (lights[i]->isDelta() || !carried) m_direct.push_back(i);
@@ -48,7 +51,7 @@ class MarchIntegrator final : public Integrator {
 
  private:
   // Steps lie on one lattice along the ray, offset at random, so that neighbouring rays do not
-  // band; cells without extinction are skipped.
+  // band; cells without extinction and emission are skipped.
   float march(const Segment& ray, RayRadiance& result, Rng& rng,
               IntegratorCounters& counters) const {
     float transmittance = 1.0f;
@@ -57,7 +60,7 @@ class MarchIntegrator final : public Integrator {
     for (volume::MajorantGrid::Walk walk(m_medium.majorants(), ray.origin, ray.direction, 0.0f,
                                          ray.length);
          !walk.done(); walk.advance()) {
-      if (!(walk.majorant() > 0.0f)) continue;
+      if (!(walk.majorant() > 0.0f) && !(m_emission && m_emission->inCell(walk.cell()))) continue;
       const float end = walk.end();
       // The source inside a step varies by the extinction of the light on its way in, which the
       // midpoint rule sees to (depth)^2 / 24: dense smoke takes finer steps, in powers of two of
@@ -94,13 +97,17 @@ class MarchIntegrator final : public Integrator {
     } else {
       m_medium.coefficients(p, c);
     }
-    if (!(c.extinction > 0.0f)) return transmittance;
+    if (!(c.extinction > 0.0f)) {
+      if (m_emission) result.emission += transmittance * dx * m_emission->at(p);
+      return transmittance;
+    }
     const float depth = c.extinction * dx;
     // (1 - exp(-x)) / x, its series where the difference would cancel.
     const float attenuated = fastExp(-depth);
     const float average = depth > 1e-3f ? (1.0f - attenuated) / depth : 1.0f - 0.5f * depth;
     const float weight = transmittance * average * dx;
     const Vec3f wo = -ray.direction;
+    if (m_emission) result.emission += weight * m_emission->at(p);
     if (m_options.effects.singleScattering)
       result.single += weight * direct(ray, p, t0, t1, wo, c, rng, counters);
     if (m_source) {
@@ -159,6 +166,7 @@ class MarchIntegrator final : public Integrator {
   const Shadows& m_shadows;
   const estimators::InscatterSource* m_source;
   MarchOptions m_options;
+  const transport::Emission* m_emission;  // nullptr where there is none
   float m_step;
   std::vector<std::size_t> m_direct;  // lamps whose single scattering is evaluated here
 };

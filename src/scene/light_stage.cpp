@@ -15,9 +15,9 @@ void report(const transport::TraceStatistics& traced, const estimators::LightFie
             FrameStatistics& s) {
   s.photonsEmitted = traced.photons;
   s.photonsScattered = traced.scatterings;
-  // Every flight after a scattering leaves light; the first one does where lamps with extent are
-  // kept.
-  s.photonsStored = layout.unscattered ? traced.flights : traced.scatterings;
+  // Every flight after a scattering or from the smoke's own emission leaves light; the first one of
+  // a lamp does where lamps with extent are kept.
+  s.photonsStored = layout.unscattered ? traced.flights : traced.scatterings + traced.born;
   s.photonsCapped = traced.capped;
   s.majorantViolations += traced.majorantViolations;
   s.energyEmitted = traced.emitted;

@@ -93,6 +93,44 @@ std::span<const Param> volumeParams() {
   return rows;
 }
 
+std::span<const Param> emissionParams() {
+  static constexpr Param rows[] = {
+      {.name = "grid",
+       .type = ParamType::text,
+       .unit = "",
+       .defaultText = "",
+       .help = "grid whose value * scale * color is the light given off [W m^-3 sr^-1]"},
+      {.name = "temperature",
+       .type = ParamType::text,
+       .unit = "",
+       .defaultText = "",
+       .help = "in place of `grid`: grid of temperatures, which give scale * the radiance of a "
+               "black body"},
+      {.name = "scale",
+       .unit = "W m^-3 sr^-1, or 1/m with `temperature`",
+       .defaultText = "1.0",
+       .help = "strength",
+       .min = 0,
+       .max = 1e30},
+      {.name = "color",
+       .type = ParamType::rgb,
+       .unit = "",
+       .defaultText = "1.0",
+       .help = "with `grid`",
+       .min = 0,
+       .max = 1e6},
+      {.name = "kelvin_scale",
+       .unit = "K",
+       .defaultText = "1.0",
+       .help = "with `temperature`: kelvin for each unit of value"},
+      {.name = "kelvin_offset",
+       .unit = "K",
+       .defaultText = "0.0",
+       .help = "with `temperature`: added; a value of 0 stays dark"},
+  };
+  return rows;
+}
+
 std::span<const Param> estimatorParams() {
   static constexpr Param rows[] = {
       {.name = "type",
@@ -289,8 +327,7 @@ std::span<const Param> effectsParams() {
        .unit = "",
        .defaultText = "auto",
        .help = "light that the smoke gives off",
-       .choices = states,
-       .unserved = "on"},
+       .choices = states},
       {.name = "single_scattering",
        .type = ParamType::text,
        .unit = "",
