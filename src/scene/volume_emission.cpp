@@ -16,6 +16,12 @@ namespace {
 using Scalars = volume::BrickField<float>;
 using Colours = volume::BrickField<Vec4f>;
 
+// Visible glow begins about here (Draper 1847) [K].
+constexpr double kGlows = 800.0;
+// A black body colder than this sends out under 1e-12 of the light that one of kGlows does [K];
+// it counts as dark.
+constexpr double kDark = 300.0;
+
 // The field whose nodes are a function of another's.
 template <class Function>
 Colours mapNodes(const Scalars& from, const Function& function) {
@@ -43,12 +49,13 @@ image::Chromaticities primaries(const std::string& space, const std::string& whe
   return *found;
 }
 
-Colours glow(const Scalars& values, const VolumeEntry& entry, const std::string& colorspace,
-             std::vector<std::string>& notes) {
+Colours glow(const Scalars& values, const VolumeEntry& entry, const std::string& path,
+             const std::string& colorspace, std::vector<std::string>& notes) {
   const ParamValues& e = entry.emission;
   const double kelvinScale = e.real("kelvin_scale"), kelvinOffset = e.real("kelvin_offset");
   const auto kelvin = [&](float value) {
-    return static_cast<double>(value) * kelvinScale + kelvinOffset;
+    const double k = static_cast<double>(value) * kelvinScale + kelvinOffset;
+    return k > kDark ? k : 0.0;
   };
   double lowest = 1e30, highest = 0;
   volume::forEachNode(values, [&](float value) {
@@ -57,27 +64,40 @@ Colours glow(const Scalars& values, const VolumeEntry& entry, const std::string&
     lowest = std::min(lowest, k);
     highest = std::max(highest, k);
   });
-  if (!(highest > 0)) return {};
   if (highest > 1e8)
     throw ConfigError(
         fmt::format("{}: 'emission' makes the largest temperature {:.3g} K; lower "
                     "kelvin_scale",
                     entry.where, highest));
-  // What is colder than this sends out less than 1e-12 of what 1000 K does.
-  const image::BlackbodyTable table(primaries(colorspace, entry.where),
-                                    std::clamp(lowest, 300.0, highest), highest);
+  if (highest < kGlows) {
+    notes.push_back(
+        fmt::format("emission: no temperature in {} reaches {} K, under which nothing "
+                    "glows visibly; kelvin_scale turns a solver's numbers into kelvin",
+                    path, kGlows));
+    if (!(highest > 0)) return {};
+  }
+  const image::BlackbodyTable table(primaries(colorspace, entry.where), lowest, highest);
   const double scale = e.real("scale");
   std::atomic<std::uint64_t> clipped{0};
+  std::atomic<double> deepest{0.0};
   Colours field = mapNodes(values, [&](float value) {
     const Vec3d j = scale * table.at(kelvin(value));
-    if (j.x < 0 || j.y < 0 || j.z < 0) clipped.fetch_add(1, std::memory_order_relaxed);
+    const double below = maxComponent(-j);
+    if (below > 0) {
+      clipped.fetch_add(1, std::memory_order_relaxed);
+      double known = deepest;
+      while (known < below && !deepest.compare_exchange_weak(known, below)) {
+      }
+    }
     return Rgb(glm::max(j, Vec3d(0.0)));
   });
-  if (clipped > 0)
-    notes.push_back(
-        fmt::format("emission: {} nodes have a colour outside {}; what is negative in "
-                    "them is clipped to 0",
-                    clipped.load(), colorspace));
+  // Cool nodes lie outside many spaces and shine next to nothing: no news.
+  const double share = deepest / std::max(scale * maxComponent(table.at(highest)), 1e-300);
+  if (share > 1e-5)
+    notes.push_back(fmt::format(
+        "emission: {} nodes have a colour outside {}; what is negative in them, at most {:.2g} of "
+        "the brightest node, is clipped to 0",
+        clipped.load(), colorspace, share));
   return field;
 }
 
@@ -93,7 +113,7 @@ transport::VolumeEmission placeEmission(const VolumeEntry& entry, const VolumeSo
       volume::bricksFromGrid(source.emission, 0, source.path, thermal, budgetBytes);
   if (values.empty()) return placed;
   if (thermal) {
-    placed.field = glow(values, entry, colorspace, notes);
+    placed.field = glow(values, entry, source.path, colorspace, notes);
   } else {
     const Rgb unit = entry.emission.rgb("color") * static_cast<float>(entry.emission.real("scale"));
     placed.field = mapNodes(values, [&](float value) { return value * unit; });

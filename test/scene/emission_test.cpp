@@ -106,8 +106,16 @@ TEST_F(EmissionScene, TemperaturesGiveTheRadianceOfABlackBody) {
       render("{ temperature = \"kelvin\", kelvin_scale = 800, scale = 0.01 }",
              {"output.colorspace=lin_rec709"});
   EXPECT_EQ(mean(narrow.layers.emission).z, 0.0);
-  EXPECT_TRUE(std::any_of(narrow.notes.begin(), narrow.notes.end(),
-                          [](const std::string& note) { return contains(note, "clipped"); }));
+  const auto says = [](const FrameResult& frame, const char* word) {
+    return std::any_of(frame.notes.begin(), frame.notes.end(),
+                       [&](const std::string& note) { return contains(note, word); });
+  };
+  EXPECT_TRUE(says(narrow, "clipped"));
+  EXPECT_FALSE(says(r, "clipped"));
+  // Numbers that are no kelvin stay dark, and that is said.
+  const FrameResult cold = render("{ temperature = \"kelvin\" }");
+  EXPECT_FALSE(effect(cold, "emission").on);
+  EXPECT_TRUE(says(cold, "kelvin_scale"));
 }
 
 TEST_F(EmissionScene, OffIsAsIfThereWereNone) {
@@ -147,7 +155,8 @@ TEST_F(EmissionScene, WrongTablesAreRefused) {
   EXPECT_TRUE(contains(parse("{ grid = \"a\", scale = -1.0 }"), "at least 0"));
   EXPECT_TRUE(contains(parse("{ grid = \"a\", colour = 1.0 }"), "did you mean 'color'?"));
   EXPECT_EQ(parse("{ grid = \"a\", scale = 2.0, color = [1, 0, 0] }"), "");
-  const std::string missing = complaint([&] { render("{ grid = \"fire\" }"); }, ExitCode::inputInvalid);
+  const std::string missing =
+      complaint([&] { render("{ grid = \"fire\" }"); }, ExitCode::inputInvalid);
   EXPECT_TRUE(contains(missing, "no grid is named 'fire'")) << missing;
   EXPECT_TRUE(contains(missing, "'flame'")) << missing;
 }
