@@ -34,6 +34,17 @@ constexpr Named<SpatialKernel> kKernels[] = {{SpatialKernel::epanechnikov, "epan
                                              {SpatialKernel::box, "box"},
                                              {SpatialKernel::gaussian, "gaussian"}};
 
+constexpr Named<sphere::DirectionDeposit> kDirections[] = {
+    {sphere::DirectionDeposit::nearest, "nearest"},
+    {sphere::DirectionDeposit::barycentric, "barycentric"},
+    {sphere::DirectionDeposit::kernel, "kernel"}};
+constexpr Named<Representative> kRepresentatives[] = {{Representative::bin, "bin"},
+                                                      {Representative::mean, "mean"}};
+constexpr Named<sphere::AngularKernel> kAngularKernels[] = {
+    {sphere::AngularKernel::none, "none"},
+    {sphere::AngularKernel::epanechnikov, "epanechnikov"},
+    {sphere::AngularKernel::gaussian, "gaussian"}};
+
 template <class E, std::size_t N>
 const char* nameOf(const Named<E> (&table)[N], E value) {
   for (const auto& row : table)
@@ -55,6 +66,7 @@ class Reader {
   Reader(std::string path, Metadata metadata)
       : m_path(std::move(path)), m_metadata(std::move(metadata)) {}
 
+  bool has(const std::string& key) const { return m_metadata.count(key) != 0; }
   const std::string& text(const std::string& key) const {
     const auto found = m_metadata.find(key);
     if (found == m_metadata.end())
@@ -113,6 +125,13 @@ Metadata describe(const LightField& field, const LightCacheKey& key) {
   m["energy"] = nameOf(kEnergies, l.energy);
   m["spatial_kernel"] = nameOf(kKernels, l.kernel);
   m["rows"] = std::to_string(l.rows);
+  m["direction"] = nameOf(kDirections, l.direction);
+  m["representative"] = nameOf(kRepresentatives, l.representative);
+  if (l.direction == sphere::DirectionDeposit::kernel) {
+    m["kernel"] = nameOf(kAngularKernels, l.angularKernel);
+    m["bandwidth"] = exact(l.bandwidth);
+    m["truncation"] = exact(l.truncation);
+  }
   m["channels"] = std::to_string(l.channels);
   m["phases"] = std::to_string(l.phases);
   m["unscattered"] = std::string(1, l.unscattered ? '1' : '0');
@@ -134,28 +153,35 @@ Metadata describe(const LightField& field, const LightCacheKey& key) {
   return m;
 }
 
-// One set of values as a strided attribute, and its sum over bins.
+// One set of values as strided attributes: bins, their sum, and mean directions where they are
+// kept.
 void addSet(volume::ParticleSet& points, const LightField& field, std::size_t set,
             const std::string& suffix) {
   const LightFieldLayout& l = field.layout;
   const auto stride = static_cast<std::size_t>(l.valuesPerCarrier());
   const auto size = static_cast<std::size_t>(l.setSize());
+  const auto light = static_cast<std::size_t>(l.bins() * l.channels);
   const auto channels = static_cast<std::size_t>(l.channels);
-  std::vector<float> histogram, energy;
-  histogram.reserve(field.carriers() * size);
+  std::vector<float> histogram, energy, directions;
+  histogram.reserve(field.carriers() * light);
   energy.reserve(field.carriers() * channels);
+  directions.reserve(field.carriers() * (size - light));
   for (std::size_t i = 0; i < field.carriers(); ++i) {
     const float* values = field.values.data() + i * stride + set * size;
-    histogram.insert(histogram.end(), values, values + size);
+    histogram.insert(histogram.end(), values, values + light);
+    directions.insert(directions.end(), values + light, values + size);
     for (std::size_t c = 0; c < channels; ++c) {
       double sum = 0;
-      for (std::size_t j = c; j < size; j += channels)
+      for (std::size_t j = c; j < light; j += channels)
         sum += static_cast<double>(values[j]);
       energy.push_back(static_cast<float>(sum));
     }
   }
-  points.add({fmt::format("photon_histogram{}", suffix), l.setSize(), std::move(histogram)});
+  points.add(
+      {fmt::format("photon_histogram{}", suffix), static_cast<int>(light), std::move(histogram)});
   points.add({fmt::format("photon_energy{}", suffix), l.channels, std::move(energy)});
+  if (l.keepsMeans())
+    points.add({fmt::format("photon_direction{}", suffix), 3 * l.bins(), std::move(directions)});
 }
 
 const std::vector<float>& floats(const volume::ParticleSet& points, const std::string& name,
@@ -231,6 +257,17 @@ LightField readLightCache(const std::filesystem::path& path, const LightCacheKey
   l.energy = m.choice("energy", kEnergies);
   l.kernel = m.choice("spatial_kernel", kKernels);
   l.rows = m.whole("rows", 1, 64);
+  // Caches written before these choices existed hold their defaults.
+  if (m.has("direction")) l.direction = m.choice("direction", kDirections);
+  if (m.has("representative")) l.representative = m.choice("representative", kRepresentatives);
+  if (l.direction == sphere::DirectionDeposit::kernel) {
+    l.angularKernel = m.choice("kernel", kAngularKernels);
+    l.bandwidth = m.number("bandwidth");
+    l.truncation = m.number("truncation");
+    if (!(l.bandwidth >= 1e-4 && l.bandwidth <= 1e4)) m.bad("bandwidth");
+    if (!(l.truncation > 0)) m.bad("truncation");
+    if (l.angularKernel == sphere::AngularKernel::none) m.bad("kernel");
+  }
   l.channels = m.whole("channels", 1, 3);
   if (l.channels == 2) m.bad("channels");
   l.phases = m.whole("phases", 1, transport::kMaxPhases);
@@ -258,16 +295,19 @@ LightField readLightCache(const std::filesystem::path& path, const LightCacheKey
   }
 
   const auto size = static_cast<std::size_t>(l.setSize());
+  const auto light = static_cast<std::size_t>(l.bins() * l.channels);
   const auto stride = static_cast<std::size_t>(l.valuesPerCarrier());
   field.values.resize(count * stride);
-  for (std::size_t set = 0; set < (l.unscattered ? 2u : 1u); ++set) {
-    const auto& histogram =
-        floats(points, set ? "photon_histogram_unscattered" : "photon_histogram", count * size,
-               path.string());
+  const auto place = [&](const std::string& name, std::size_t width, std::size_t offset) {
+    const auto& from = floats(points, name, count * width, path.string());
     for (std::size_t i = 0; i < count; ++i)
-      std::copy_n(
-          histogram.data() + i * size, size,
-          field.values.data() + static_cast<std::size_t>((*order)[i]) * stride + set * size);
+      std::copy_n(from.data() + i * width, width,
+                  field.values.data() + static_cast<std::size_t>((*order)[i]) * stride + offset);
+  };
+  for (std::size_t set = 0; set < (l.unscattered ? 2u : 1u); ++set) {
+    const std::string suffix = set ? "_unscattered" : "";
+    place("photon_histogram" + suffix, light, set * size);
+    if (l.keepsMeans()) place("photon_direction" + suffix, size - light, set * size + light);
   }
   if (l.carrier == Carrier::particles) {
     const auto& local = floats(points, "light_local", count * 3, path.string());

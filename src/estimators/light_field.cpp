@@ -56,7 +56,8 @@ void traceVoxels(const Medium& medium, const transport::LightList& lights, const
   const double power = transport::sharedPower(medium, lights);
   const double diameter = 2.0 * transport::boundingSphere(medium).radius;
   sums.quantum = power > 0 && diameter > 0 ? power * diameter * 0x1p-24 : 1.0;
-  VoxelSink sink(medium, lights, field.layout, view, field.lattice, options.key, sums);
+  VoxelSink sink(CarrierSums(medium, lights, field.layout, view, options.key, sums),
+                 field.layout.deposit, field.lattice);
   statistics = transport::tracePhotons(medium, lights, options, sink);
   checkSums(sums);
   const double volume = edge * edge * edge;
@@ -73,7 +74,8 @@ void traceCollisionsOnParticles(const Medium& medium, const transport::LightList
   const double power = transport::sharedPower(medium, lights);
   sums.quantum = power > 0 ? power * 0x1p-24 : 1.0;
   const ParticleIndex index(field.particles, field.layout.depositRadius);
-  ParticleSink sink(medium, lights, field.layout, view, field.particles, index, options.key, sums);
+  ParticleSink sink(CarrierSums(medium, lights, field.layout, view, options.key, sums),
+                    field.layout, field.particles, index);
   statistics = transport::tracePhotons(medium, lights, options, sink);
   checkSums(sums);
   field.farPhotons = sink.farPhotons();
@@ -103,6 +105,7 @@ LightField traceLightField(const Medium& medium, const transport::LightList& lig
                            const std::vector<Vec3f>& particles,
                            const transport::TraceOptions& options,
                            transport::TraceStatistics& statistics) {
+  checkLayout(layout);
   LightField field;
   field.layout = layout;
   field.photons = options.photons;

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "estimator_options.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/frames.h"
 #include "photosphere/core/registry.h"
@@ -255,22 +256,12 @@ void buildLayout(const SceneFile& scene, const SetupOptions& options, FrameSetup
   using namespace estimators;
   const ParamValues& e = scene.estimator;
   LightFieldLayout& l = setup.layout;
-  const std::string& basis = e.text("basis");
   const bool cached = options.forLightCache || !e.text("cache").empty();
-  l.carrier = e.text("carrier") == "particles" ? Carrier::particles : Carrier::voxels;
-  l.basis = basis == "view" || (basis == "auto" && !cached) ? Basis::view : Basis::histogram;
-  l.deposit = e.text("deposit") == "collision" ? Deposit::collision : Deposit::trackLength;
-  l.energy = e.text("energy") == "scatter" ? EnergyRule::scatter : EnergyRule::gather;
-  const std::string& kernel = e.text("spatial_kernel");
-  l.kernel = kernel == "box"        ? SpatialKernel::box
-             : kernel == "gaussian" ? SpatialKernel::gaussian
-                                    : SpatialKernel::epanechnikov;
-  l.rows = static_cast<int>(e.integer("rows"));
+  l = layoutOf(e, cached);
   l.channels = setup.effects.chromatic ? 3 : 1;
   l.phases = static_cast<int>(setup.medium->phases().size());
   for (const auto& light : setup.lights)
     l.unscattered = l.unscattered || (!light->isDelta() && setup.effects.singleScattering);
-  l.lightVoxel = e.real("light_voxel");
   l.radius = e.real("radius") * setup.space.metersPerUnit;
   if (!(l.radius > 0)) {
     l.radius = automaticRadius(*setup.medium, l, static_cast<std::uint64_t>(e.integer("photons")));
@@ -304,21 +295,24 @@ FrameSetup setUpFrame(const SceneFile& scene, std::int64_t frame, const SetupOpt
 std::uint64_t predictedLightFieldBytes(const FrameSetup& setup) {
   const estimators::LightFieldLayout& l = setup.layout;
   const auto values = static_cast<std::uint64_t>(l.valuesPerCarrier());
-  constexpr std::uint64_t kBytes = sizeof(std::int64_t) + sizeof(float);
+  // Per step the floats are sharpened, which takes as many again.
+  const bool perStep = l.evaluate == estimators::Evaluate::perStep;
+  const std::uint64_t bytesEach = sizeof(std::int64_t) + sizeof(float) * (perStep ? 2 : 1);
   const transport::Medium& medium = *setup.medium;
   if (medium.bounds().empty()) return 0;
   std::uint64_t bytes = 0;
-  if (l.carrier == estimators::Carrier::particles) bytes = setup.particles.size() * values * kBytes;
+  if (l.carrier == estimators::Carrier::particles)
+    bytes = setup.particles.size() * values * bytesEach;
   if (l.holdsPower()) return bytes;
   const double edge = l.lightVoxel * medium.voxelEdge();
   const int margin = static_cast<int>(std::ceil(l.radius / edge)) + 1;
   // A full box is an upper bound that costs nothing; only a large one is worth counting exactly.
   const Vec3d cells = glm::ceil(medium.bounds().extent() / edge) + 2.0 * margin + 8.0;
-  const double perVoxel = static_cast<double>(values * kBytes);
+  const double perVoxel = static_cast<double>(values * bytesEach);
   const double most = cells.x * cells.y * cells.z * perVoxel;
   if (setup.memoryBudget == 0 || most < 0.5 * static_cast<double>(setup.memoryBudget))
     return bytes + static_cast<std::uint64_t>(most);
-  return bytes + transport::SupportLattice(medium, edge, margin).size() * values * kBytes;
+  return bytes + transport::SupportLattice(medium, edge, margin).size() * values * bytesEach;
 }
 
 void checkMemory(const FrameSetup& setup, bool lightField) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator_options.h"
 #include "light_stage.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/frames.h"
@@ -82,19 +83,6 @@ std::vector<std::string> presentLayers(const FrameSetup& setup) {
   return names;
 }
 
-std::string describe(const FrameSetup& setup) {
-  using namespace estimators;
-  const LightFieldLayout& l = setup.layout;
-  const std::string basis = l.basis == Basis::view
-                                ? "view"
-                                : fmt::format("histogram of {} bins ({} rows)", l.bins(), l.rows);
-  return fmt::format(
-      "{}, {}, {}, {} channel{}{}", l.carrier == Carrier::particles ? "particles" : "voxels", basis,
-      l.deposit == Deposit::collision ? "collision" : "track_length", l.channels,
-      l.channels == 1 ? "" : "s",
-      l.holdsPower() ? (l.energy == EnergyRule::scatter ? ", scatter" : ", gather") : "");
-}
-
 // The light of a frame, ready to be looked up; null where nothing asks for it.
 struct Light {
   std::unique_ptr<estimators::InscatterSource> source;
@@ -107,11 +95,11 @@ Light prepareLight(const SceneFile& scene, const RenderRequest& request, FrameSe
       scene.estimator.text("type") == "photosphere" && setup.effects.multipleScattering;
   checkMemory(setup, wanted && scene.estimator.text("cache").empty());
   if (!wanted) return light;
-  const estimators::LightField field = lightField(scene, request, setup, result.statistics);
-  result.layout = describe(setup);
+  estimators::LightField field = lightField(scene, request, setup, result.statistics);
+  result.layout = describeLayout(setup.layout);
   result.radius = setup.layout.radius / setup.space.metersPerUnit;
   const Stopwatch watch;
-  light.source = estimators::resolve(*setup.medium, field, setup.view);
+  light.source = estimators::resolve(*setup.medium, std::move(field), setup.view, setup.key);
   result.statistics.seconds.resolve = watch.seconds();
   return light;
 }

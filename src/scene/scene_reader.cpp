@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "estimator_options.h"
 #include "photosphere/cameras/camera.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/frames.h"
@@ -342,6 +343,7 @@ void SceneReader::read() {
     for (std::size_t i = 0; i < lights->size(); ++i)
       readLight(*lights->get(i)->as_table(), i);
   readPlain("estimator", m_scene.estimator);
+  applyPreset(m_scene.estimator, m_text.name + ": [estimator]");
   readPlain("effects", m_scene.effects);
   readPlain("render", m_scene.render);
   readPlain("output", m_scene.output);
@@ -349,25 +351,7 @@ void SceneReader::read() {
 }
 
 void checkCombinations(const SceneFile& scene, const std::string& name) {
-  const ParamValues& e = scene.estimator;
-  const std::string place = name + ": [estimator]";
-  const bool particles = e.text("carrier") == "particles";
-  const bool collisions = e.text("deposit") == "collision";
-  if (e.text("energy") == "scatter" && !(particles && collisions))
-    throw ConfigError(place +
-                      ": energy = \"scatter\" needs carrier = \"particles\" and deposit = "
-                      "\"collision\"; other carriers hold no energy to share out");
-  if (e.real("deposit_radius") > 0 && !(particles && collisions))
-    throw ConfigError(place +
-                      ": 'deposit_radius' needs carrier = \"particles\" and deposit = "
-                      "\"collision\"; elsewhere use 'radius'");
-  if (!e.text("cache").empty() && e.text("type") != "photosphere")
-    throw ConfigError(
-        fmt::format("{}: 'cache' needs type = \"photosphere\", not \"{}\"", place, e.text("type")));
-  if (!e.text("cache").empty() && e.text("basis") == "view")
-    throw ConfigError(place +
-                      ": basis = \"view\" holds light for one camera and is never cached; leave "
-                      "'basis' at auto with a 'cache'");
+  checkEstimator(scene.estimator, name + ": [estimator]");
   const double limit = scene.render.real("memory_limit");
   if (limit < 0 && limit != -1)
     throw ConfigError(name +

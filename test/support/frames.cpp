@@ -102,7 +102,7 @@ PhotosphereFrame renderPhotosphere(const TestScene& scene, estimators::LightFiel
                                   scene.particles, options, frame.statistics);
   frame.traceSeconds = trace.seconds();
   Stopwatch resolveWatch;
-  const auto source = estimators::resolve(*scene.medium, field, scene.view());
+  const auto source = estimators::resolve(*scene.medium, field, scene.view(), options.key);
   const auto edge = static_cast<float>(scene.medium->voxelEdge());
   const render::Shadows shadows(*scene.medium, scene.lights, render::ShadowMode::grid, edge, 0);
   frame.resolveSeconds = resolveWatch.seconds();

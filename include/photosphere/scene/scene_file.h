@@ -62,6 +62,16 @@ std::span<const Param> effectsParams();
 std::span<const Param> renderParams();
 std::span<const Param> outputParams();
 
+/// A named set of values of [estimator], for `preset`. Keys given beside it win.
+struct PresetValue {
+  std::string_view key, value;
+};
+struct Preset {
+  std::string_view name, help;
+  std::span<const PresetValue> values;
+};
+std::span<const Preset> estimatorPresets();
+
 /// Reads and checks a scene file.
 /// @param sets  `dotted.path=value` with the value as TOML, else as a string:
 ///              `volume.0.density_scale=4`, `light.0.intensity=2`; missing tables are created
