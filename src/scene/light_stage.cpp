@@ -54,7 +54,7 @@ void noteIdleKeys(const SceneFile& scene, FrameSetup& setup) {
   std::vector<std::string_view> idle;
   for (const std::string_view key :
        {"photons", "radius", "deposit_radius", "spatial_kernel", "carrier", "basis", "deposit",
-        "rows", "energy", "direction", "representative", "light_voxel"})
+        "rows", "order", "energy", "direction", "representative", "light_voxel"})
     if (scene.estimator.given(key)) idle.push_back(key);
   if (!idle.empty())
     setup.notes.push_back(

@@ -32,9 +32,9 @@ void SphericalHarmonics::evaluate(const Vec3f& w, float* y) const {
       const float value = m_norm[static_cast<std::size_t>(index(l, m))] * legendre;
       y[index(l, m)] = value * real;
       if (m > 0) y[index(l, -m)] = value * imaginary;
-      const float next = (static_cast<float>(2 * l + 1) * w.z * legendre -
-                          static_cast<float>(l + m) * before) /
-                         static_cast<float>(l - m + 1);
+      const float next =
+          (static_cast<float>(2 * l + 1) * w.z * legendre - static_cast<float>(l + m) * before) /
+          static_cast<float>(l - m + 1);
       before = legendre;
       legendre = next;
     }

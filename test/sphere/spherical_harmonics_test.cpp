@@ -69,8 +69,7 @@ TEST(SphericalHarmonics, AreOrthonormal) {
     harmonics.evaluate(Vec3f(q.directions[i]), y.data());
     for (std::size_t a = 0; a < n; ++a)
       for (std::size_t b = 0; b < n; ++b)
-        products[a * n + b] +=
-            q.weights[i] * static_cast<double>(y[a]) * static_cast<double>(y[b]);
+        products[a * n + b] += q.weights[i] * static_cast<double>(y[a]) * static_cast<double>(y[b]);
   }
   for (std::size_t a = 0; a < n; ++a)
     for (std::size_t b = 0; b < n; ++b)

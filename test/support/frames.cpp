@@ -88,7 +88,8 @@ render::FrameLayers renderPath(const TestScene& scene, int samples, std::uint64_
 }
 
 PhotosphereFrame renderPhotosphere(const TestScene& scene, estimators::LightFieldLayout layout,
-                                   std::uint64_t photons, std::uint64_t seed, int samples) {
+                                   std::uint64_t photons, std::uint64_t seed, int samples,
+                                   int gatherRays) {
   PhotosphereFrame frame;
   layout.phases = static_cast<int>(scene.medium->phases().size());
   if (layout.radius == 0) layout.radius = automaticRadius(*scene.medium, layout, photons);
@@ -103,12 +104,15 @@ PhotosphereFrame renderPhotosphere(const TestScene& scene, estimators::LightFiel
   frame.traceSeconds = trace.seconds();
   Stopwatch resolveWatch;
   const auto source = estimators::resolve(*scene.medium, field, scene.view(), options.key);
+  frame.clampedShare = source->clampedShare();
   const auto edge = static_cast<float>(scene.medium->voxelEdge());
   const render::Shadows shadows(*scene.medium, scene.lights, render::ShadowMode::grid, edge, 0);
   frame.resolveSeconds = resolveWatch.seconds();
   Stopwatch march;
+  render::MarchOptions marching;
+  marching.gatherRays = gatherRays;
   const auto integrator =
-      render::makeMarchIntegrator(*scene.medium, scene.lights, shadows, source.get(), {});
+      render::makeMarchIntegrator(*scene.medium, scene.lights, shadows, source.get(), marching);
   frame.layers =
       render::renderFrame(*scene.camera, *integrator, frameOptions(scene, samples, seed + 1000));
   frame.marchSeconds = march.seconds();

@@ -38,10 +38,13 @@ struct PhotosphereFrame {
   render::FrameLayers layers;
   transport::TraceStatistics statistics;
   double traceSeconds = 0, resolveSeconds = 0, marchSeconds = 0;
+  double clampedShare = 0;
 };
 /// A frame rendered by the photosphere; layout.radius 0 = automatic.
+/// @param gatherRays  final gathering, rays of each camera sample
 PhotosphereFrame renderPhotosphere(const TestScene& scene, estimators::LightFieldLayout layout,
-                                   std::uint64_t photons, std::uint64_t seed, int samples = 4);
+                                   std::uint64_t photons, std::uint64_t seed, int samples = 4,
+                                   int gatherRays = 0);
 
 /// Error of one layer against the mean of two independent references, noise subtracted.
 struct LayerError {
