@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator_options.h"
 #include "light_stage.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/frames.h"
@@ -82,19 +83,6 @@ std::vector<std::string> presentLayers(const FrameSetup& setup) {
   return names;
 }
 
-std::string describe(const FrameSetup& setup) {
-  using namespace estimators;
-  const LightFieldLayout& l = setup.layout;
-  const std::string basis = l.basis == Basis::view
-                                ? "view"
-                                : fmt::format("histogram of {} bins ({} rows)", l.bins(), l.rows);
-  return fmt::format(
-      "{}, {}, {}, {} channel{}{}", l.carrier == Carrier::particles ? "particles" : "voxels", basis,
-      l.deposit == Deposit::collision ? "collision" : "track_length", l.channels,
-      l.channels == 1 ? "" : "s",
-      l.holdsPower() ? (l.energy == EnergyRule::scatter ? ", scatter" : ", gather") : "");
-}
-
 // The light of a frame, ready to be looked up; null where nothing asks for it.
 struct Light {
   std::unique_ptr<estimators::InscatterSource> source;
@@ -107,12 +95,21 @@ Light prepareLight(const SceneFile& scene, const RenderRequest& request, FrameSe
       scene.estimator.text("type") == "photosphere" && setup.effects.multipleScattering;
   checkMemory(setup, wanted && scene.estimator.text("cache").empty());
   if (!wanted) return light;
-  const estimators::LightField field = lightField(scene, request, setup, result.statistics);
-  result.layout = describe(setup);
+  estimators::LightField field = lightField(scene, request, setup, result.statistics);
+  result.layout = describeLayout(setup.layout);
   result.radius = setup.layout.radius / setup.space.metersPerUnit;
   const Stopwatch watch;
-  light.source = estimators::resolve(*setup.medium, field, setup.view);
+  light.source = estimators::resolve(*setup.medium, std::move(field), setup.view, setup.key);
   result.statistics.seconds.resolve = watch.seconds();
+  result.statistics.clampedLight = light.source->clampedShare();
+  if (result.statistics.clampedLight > 0.001)
+    setup.notes.push_back(fmt::format(
+        "{:.2g} of the stored light is below zero toward where it is read and counts as 0, a bias "
+        "of the basis beside sharp peaks; raise estimator.{}",
+        result.statistics.clampedLight,
+        setup.layout.basis == estimators::Basis::sphericalHarmonics
+            ? "order, or smooth with estimator.kernel"
+            : "rows"));
   return light;
 }
 
@@ -151,7 +148,10 @@ void renderLayers(const SceneFile& scene, const RenderRequest& request, const Fr
     render::MarchOptions march;
     march.step = static_cast<float>(scene.render.real("step"));
     march.effects = setup.effects;
-    const auto mode = setup.effects.singleScattering && setup.effects.shadows
+    const std::int64_t gathered = source ? scene.estimator.integer("final_gather") : 0;
+    march.gatherRays = static_cast<int>((gathered + options.samples - 1) / options.samples);
+    const bool shadowed = setup.effects.singleScattering && setup.effects.shadows;
+    const auto mode = shadowed || march.gatherRays > 0
                           ? shadowMode(scene.render.text("shadow"))
                           : render::ShadowMode::march;  // tabulates nothing
     const render::Shadows shadows(*setup.medium, setup.lights, mode,
@@ -240,7 +240,7 @@ FrameStatistics traceScene(const SceneFile& scene, std::int64_t frame, const std
   if (scene.estimator.text("basis") == "view")
     throw ConfigError(
         "estimator.basis = \"view\" holds light for one camera and cannot be cached; use "
-        "\"histogram\" or \"auto\"");
+        "\"histogram\", \"spherical_harmonics\" or \"auto\"");
   const Stopwatch total;
   const double cpuBefore = processCpuSeconds();
   SetupOptions options = setupOptions(request);

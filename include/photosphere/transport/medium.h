@@ -3,11 +3,13 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "photosphere/core/types.h"
 #include "photosphere/phase/phase.h"
+#include "photosphere/transport/emission.h"
 #include "photosphere/volume/bricks.h"
 #include "photosphere/volume/majorant_grid.h"
 
@@ -26,6 +28,7 @@ struct MediumVolume {
   std::vector<volume::BrickField<float>> albedoFields;  ///< none, one (grey) or three
   Mat4d localFromAlbedoNode{1.0};
   phase::HenyeyGreenstein phase{0.0};
+  VolumeEmission emission;  ///< its field is empty where the volume does not emit
 };
 
 /// Coefficients at a point.
@@ -82,9 +85,11 @@ class Medium {
   /// Distinct phase functions, in order of first use.
   const std::vector<phase::HenyeyGreenstein>& phases() const { return m_phases; }
   const volume::MajorantGrid& majorants() const { return m_majorants; }
-  /// Tight box around all extinction; empty when there is none.
+  /// Light that the medium gives off; nullptr when it gives off none.
+  const Emission* emission() const { return m_emission.get(); }
+  /// Tight box around all extinction and emission; empty when there is neither.
   const Box3d& bounds() const { return m_majorants.bounds(); }
-  /// Smallest voxel edge of all volumes [m].
+  /// Smallest voxel edge of all densities [m]; of all emission where there is no density.
   double voxelEdge() const { return m_voxelEdge; }
   /// True when every albedo has equal channels.
   bool isGrey() const { return m_grey; }
@@ -127,6 +132,7 @@ class Medium {
   std::vector<Placed> m_placed;
   std::vector<Albedo> m_albedo;
   std::vector<phase::HenyeyGreenstein> m_phases;
+  std::unique_ptr<Emission> m_emission;
   volume::MajorantGrid m_majorants;
   double m_voxelEdge = 1.0;
   bool m_grey = true;

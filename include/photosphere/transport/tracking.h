@@ -126,6 +126,21 @@ inline Collision sampleCollisionAndTransmittance(const Medium& medium, const Vec
   return first;
 }
 
+/// Unbiased integral of the medium's emission along a ray [W m^-2 sr^-1], not attenuated: up to a
+/// real collision its mean is what arrives attenuated. One random point in every stretch of the
+/// lattice that can emit.
+inline Rgb sampleEmission(const Medium& medium, const Emission& emission, const Vec3f& o,
+                          const Vec3f& d, float length, Rng& rng) {
+  Rgb sum(0.0f);
+  for (volume::MajorantGrid::Walk walk(medium.majorants(), o, d, 0.0f, length); !walk.done();
+       walk.advance()) {
+    if (!emission.inCell(walk.cell())) continue;
+    const float span = walk.end() - walk.begin();
+    if (span > 0.0f) sum += span * emission.at(o + d * (walk.begin() + rng.uniform() * span));
+  }
+  return sum;
+}
+
 /// Optical depth along a ray by the midpoint rule.
 /// @param step  [m]
 float marchOpticalDepth(const Medium& medium, const Vec3f& o, const Vec3f& d, float length,

@@ -111,10 +111,30 @@ class BrickField {
 extern template class BrickField<float>;
 extern template class BrickField<Vec4f>;
 
+/// Calls visit(value) for every stored node; those that bricks share, more than once.
+template <class T, class Visit>
+void forEachNode(const BrickField<T>& field, const Visit& visit) {
+  const Vec3i& bricks = field.bricks();
+  for (int z = 0; z < bricks.z && !field.empty(); ++z)
+    for (int y = 0; y < bricks.y; ++y)
+      for (int x = 0; x < bricks.x; ++x) {
+        const std::int32_t brick = field.brickAt({x, y, z});
+        for (int i = 0; brick >= 0 && i < BrickField<T>::kBrickSize; ++i)
+          visit(field.nodes(brick)[i]);
+      }
+}
+
+inline float largest(float value) {
+  return value;
+}
+inline float largest(const Vec4f& value) {
+  return std::max(std::max(value.x, value.y), std::max(value.z, value.w));
+}
+
 /// Calls visit(lowest node, cells along an edge, largest value) for every voxel cell whose
 /// interpolant can be positive; a brick of one constant value is visited whole.
-template <class Visit>
-void forEachCell(const BrickField<float>& field, const Visit& visit) {
+template <class T, class Visit>
+void forEachCell(const BrickField<T>& field, const Visit& visit) {
   if (field.empty()) return;
   const Vec3i& bricks = field.bricks();
   for (int bz = 0; bz < bricks.z; ++bz)
@@ -122,23 +142,22 @@ void forEachCell(const BrickField<float>& field, const Visit& visit) {
       for (int bx = 0; bx < bricks.x; ++bx) {
         const std::int32_t brick = field.brickAt({bx, by, bz});
         if (brick < 0) continue;
-        const float* n = field.nodes(brick);
+        const T* n = field.nodes(brick);
         const Vec3i first(bx * 8, by * 8, bz * 8);
         if (field.isConstant(brick)) {
-          visit(first, 8, n[0]);
+          visit(first, 8, largest(n[0]));
           continue;
         }
-        constexpr int dy = BrickField<float>::kNodes,
-                      dz = BrickField<float>::kNodes * BrickField<float>::kNodes;
+        constexpr int dy = BrickField<T>::kNodes,
+                      dz = BrickField<T>::kNodes * BrickField<T>::kNodes;
         for (int z = 0; z < 8; ++z)
           for (int y = 0; y < 8; ++y)
             for (int x = 0; x < 8; ++x) {
-              const float* c = n + z * dz + y * dy + x;
-              const float low = std::max(std::max(c[0], c[1]), std::max(c[dy], c[dy + 1]));
-              const float high =
-                  std::max(std::max(c[dz], c[dz + 1]), std::max(c[dz + dy], c[dz + dy + 1]));
-              const float largest = std::max(low, high);
-              if (largest > 0) visit(first + Vec3i(x, y, z), 1, largest);
+              const T* c = n + z * dz + y * dy + x;
+              float most = largest(c[0]);
+              for (const int corner : {1, dy, dy + 1, dz, dz + 1, dz + dy, dz + dy + 1})
+                most = std::max(most, largest(c[corner]));
+              if (most > 0) visit(first + Vec3i(x, y, z), 1, most);
             }
       }
 }
