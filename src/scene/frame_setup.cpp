@@ -265,9 +265,13 @@ void buildLayout(const SceneFile& scene, const SetupOptions& options, FrameSetup
   l.radius = e.real("radius") * setup.space.metersPerUnit;
   if (!(l.radius > 0)) {
     l.radius = automaticRadius(*setup.medium, l, static_cast<std::uint64_t>(e.integer("photons")));
-    // About 20 particles where they fill space evenly: a ball of 3 spacings.
-    if (l.carrier == Carrier::particles)
-      l.radius = std::max(l.radius, 3.0 * carrierSpacing(setup.particles));
+    if (l.carrier == Carrier::particles) {
+      // About 20 particles where they fill space evenly: a ball of 3 spacings. Power is smoothed
+      // with the smoke it was left in, so it takes no more than that: what a wider radius blurs
+      // over the smoke's edge soon exceeds the noise that it removes (README.md).
+      const double spacings = 3.0 * carrierSpacing(setup.particles);
+      l.radius = l.holdsPower() && spacings > 0 ? spacings : std::max(l.radius, spacings);
+    }
   }
   const double deposit = e.real("deposit_radius") * setup.space.metersPerUnit;
   l.depositRadius = deposit > 0 ? deposit : l.radius;
