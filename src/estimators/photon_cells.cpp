@@ -6,7 +6,7 @@
 
 #include "cell_grid.h"
 #include "deposit.h"
-#include "photon_set.h"
+#include "photosphere/estimators/photon_set.h"
 
 // Where the build may not assume AVX2, the machine is asked. Both paths round alike: the lanes are
 // the same and no operation is fused (-ffp-contract=off).

@@ -8,9 +8,9 @@
 #include <mutex>
 
 #include "deposit.h"
-#include "photon_set.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/parallel.h"
+#include "photosphere/estimators/photon_set.h"
 #include "photosphere/transport/support_lattice.h"
 
 namespace photosphere::estimators {
@@ -22,10 +22,12 @@ using transport::Medium;
 namespace {
 
 // Photons in the ball of the automatic radius if they filled the smoke evenly.
-constexpr double kWantedPhotons = 200.0;
+constexpr double kWantedPhotons = 60.0;
 // Photons that a forecast traces.
 constexpr std::uint64_t kForecastPhotons = 16384;
 constexpr std::uint64_t kMostPhotons = 0xfffffff0u;
+// Radius over the smoke's extent at least: float positions resolve nothing below it.
+constexpr double kSmallestRadius = 1e-6;
 
 // Keeps the collisions of flights, batch by batch.
 class CollisionSink final : public transport::FlightSink {
@@ -148,8 +150,11 @@ class Map final : public PhotonMap {
   Map(const Medium& medium, const PhotonMapLayout& layout, std::uint64_t emitted,
       CollisionSink& sink)
       : m_perPhoton(1.0f / static_cast<float>(std::max<std::uint64_t>(1, emitted))) {
-    m_sets.push_back(makeSet(sink.take(0), layout));
-    if (layout.unscattered) m_sets.push_back(makeSet(sink.take(1), layout));
+    PhotonMapLayout usable = layout;
+    usable.radius =
+        std::max(layout.radius, kSmallestRadius * maxComponent(medium.bounds().extent()));
+    m_sets.push_back(makeSet(sink.take(0), usable));
+    if (layout.unscattered) m_sets.push_back(makeSet(sink.take(1), usable));
     for (const phase::HenyeyGreenstein& phase : medium.phases())
       m_lobes.push_back({phase, smoothedPhase(phase, layout)});
   }
@@ -225,7 +230,7 @@ double automaticRadius(const Medium& medium, std::uint64_t stored) {
       static_cast<double>(transport::SupportLattice(medium, edge, 0).size()) * edge * edge * edge;
   const double ball =
       kWantedPhotons * smoke / static_cast<double>(std::max<std::uint64_t>(1, stored));
-  return std::clamp(std::cbrt(ball / (4.0 / 3.0 * kPi)), voxel, 8.0 * voxel);
+  return std::clamp(std::cbrt(ball / (4.0 / 3.0 * kPi)), 0.25 * voxel, 8.0 * voxel);
 }
 
 double progressiveRadiusFactor(int pass) {

@@ -1,4 +1,4 @@
-#include "photon_set.h"
+#include "photosphere/estimators/photon_set.h"
 
 #include <cmath>
 

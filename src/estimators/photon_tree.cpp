@@ -6,7 +6,7 @@
 #include <numeric>
 
 #include "deposit.h"
-#include "photon_set.h"
+#include "photosphere/estimators/photon_set.h"
 
 namespace photosphere::estimators {
 

@@ -1,4 +1,4 @@
-#include "smoothed_phase.h"
+#include "photosphere/estimators/smoothed_phase.h"
 
 #include <algorithm>
 #include <cmath>

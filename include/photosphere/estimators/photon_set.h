@@ -8,8 +8,8 @@
 
 #include "photosphere/core/types.h"
 #include "photosphere/estimators/light_field.h"
+#include "photosphere/estimators/smoothed_phase.h"
 #include "photosphere/phase/phase.h"
-#include "smoothed_phase.h"
 
 namespace photosphere::estimators {
 
