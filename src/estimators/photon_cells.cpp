@@ -21,7 +21,7 @@ namespace {
 constexpr int kLanes = PhotonColumns::kLanes;
 // Cells along a radius. Finer cells fit the ball better, coarser ones make longer runs; a cell
 // should still hold a few photons.
-constexpr double kCellsAlongRadius = 3.0;
+constexpr double kCellsAlongRadius = 2.0;
 
 // What the sum over one run reads.
 struct Run {
@@ -33,7 +33,7 @@ struct Run {
   Vec3f signedWo{0.0f};  // wo times the sign of g
   float absG = 0.0f;
   float oneMinusAbsGSquared = 1.0f;
-  const SmoothedPhase* smoothed = nullptr;
+  const sphere::ZonalTable* smoothed = nullptr;
 };
 using Sums = float[3][kLanes];
 using SumRun = void (*)(const Run&, Sums&);
@@ -72,7 +72,7 @@ template <SpatialKernel kernel, int channels, bool smoothed>
     for (int l = 0; l < kLanes; ++l) {
       const int i = first + l;
       if constexpr (smoothed) {
-        weight[l] *= run.smoothed->evaluate({dx[i], dy[i], dz[i]}, run.wo);
+        weight[l] *= (*run.smoothed)({dx[i], dy[i], dz[i]}, run.wo);
       } else {
         // phase::HenyeyGreenstein without its constant factor, |wo - s wi| as |s wo - wi|.
         const float x = signedWo.x - dx[i], y = signedWo.y - dy[i], z = signedWo.z - dz[i];

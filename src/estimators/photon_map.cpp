@@ -3,15 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <mutex>
 
+#include "cell_grid.h"
 #include "deposit.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/parallel.h"
 #include "photosphere/estimators/photon_set.h"
-#include "photosphere/transport/support_lattice.h"
 
 namespace photosphere::estimators {
 
@@ -21,20 +20,27 @@ using transport::Medium;
 
 namespace {
 
-// Photons in the ball of the automatic radius if they filled the smoke evenly.
+// Photons in the ball of the automatic radius where the mean photon is.
 constexpr double kWantedPhotons = 60.0;
+// Edge of the cells that a forecast measures densities in [density voxels].
+constexpr double kForecastCell = 4.0;
 // Photons that a forecast traces.
 constexpr std::uint64_t kForecastPhotons = 16384;
 constexpr std::uint64_t kMostPhotons = 0xfffffff0u;
 // Radius over the smoke's extent at least: float positions resolve nothing below it.
 constexpr double kSmallestRadius = 1e-6;
 
+// Photons that a trace emits.
+std::uint64_t countOf(const transport::TraceOptions& options) {
+  return std::min(options.photonCount,
+                  options.photons - std::min(options.firstPhoton, options.photons));
+}
+
 // Keeps the collisions of flights, batch by batch.
 class CollisionSink final : public transport::FlightSink {
  public:
-  CollisionSink(const transport::LightList& lights, const PhotonMapLayout& layout)
-      : m_channels(layout.channels),
-        m_wantsUnscattered(wantsUnscattered(lights, layout.unscattered)) {}
+  CollisionSink(const transport::LightList& lights, int channels, bool unscattered)
+      : m_channels(channels), m_wantsUnscattered(wantsUnscattered(lights, unscattered)) {}
 
   void consume(std::span<const Flight> flights) override {
     Batch batches[2];
@@ -105,38 +111,13 @@ class CollisionSink final : public transport::FlightSink {
   std::uint64_t m_counts[2] = {0, 0};
 };
 
-// Counts what a map would keep.
-class CountingSink final : public transport::FlightSink {
- public:
-  CountingSink(const transport::LightList& lights, bool unscattered)
-      : m_wantsUnscattered(wantsUnscattered(lights, unscattered)) {}
-  void consume(std::span<const Flight> flights) override {
-    std::uint64_t count = 0;
-    for (const Flight& flight : flights)
-      count += setOf(flight, m_wantsUnscattered) >= 0 && flight.collided() ? 1 : 0;
-    m_count.fetch_add(count, std::memory_order_relaxed);
-  }
-  std::uint64_t count() const { return m_count; }
-
- private:
-  std::vector<bool> m_wantsUnscattered;
-  std::atomic<std::uint64_t> m_count{0};
-};
-
-std::shared_ptr<const SmoothedPhase> smoothedPhase(const phase::HenyeyGreenstein& phase,
-                                                   const PhotonMapLayout& layout) {
-  const double h = layout.bandwidth, cut = layout.truncation * h;
-  switch (layout.directionKernel) {
-    case DirectionKernel::none:
-      return nullptr;
-    case DirectionKernel::epanechnikov:
-      return std::make_shared<SmoothedPhase>(
-          phase, [h](double angle) { return 1 - angle * angle / (h * h); }, std::min(h, cut));
-    case DirectionKernel::gaussian:
-      return std::make_shared<SmoothedPhase>(
-          phase, [h](double angle) { return std::exp(-0.5 * angle * angle / (h * h)); }, cut);
-  }
-  return nullptr;
+std::shared_ptr<const sphere::ZonalTable> smoothed(const phase::HenyeyGreenstein& phase,
+                                                   const sphere::SmoothingKernel& kernel) {
+  if (!kernel.acts()) return nullptr;
+  const sphere::LegendreMoments moments = sphere::phaseMoments(
+      [&](const Vec3f& w, const Vec3f& wo) { return static_cast<double>(phase.evaluate(w, wo)); });
+  return std::make_shared<sphere::ZonalTable>(
+      sphere::convolved(moments, sphere::kernelMoments(kernel, moments.size())));
 }
 
 std::unique_ptr<PhotonSet> makeSet(const PhotonColumns& photons, const PhotonMapLayout& layout) {
@@ -156,7 +137,7 @@ class Map final : public PhotonMap {
     m_sets.push_back(makeSet(sink.take(0), usable));
     if (layout.unscattered) m_sets.push_back(makeSet(sink.take(1), usable));
     for (const phase::HenyeyGreenstein& phase : medium.phases())
-      m_lobes.push_back({phase, smoothedPhase(phase, layout)});
+      m_lobes.push_back({phase, smoothed(phase, layout.directionKernel)});
   }
 
   Inscatter at(const Vec3f& p, const Vec3f& wo, const Coefficients& c) const override {
@@ -196,23 +177,38 @@ std::unique_ptr<PhotonMap> tracePhotonMap(const Medium& medium, const transport:
                                           const PhotonMapLayout& layout,
                                           const transport::TraceOptions& options,
                                           transport::TraceStatistics& statistics) {
-  CollisionSink sink(lights, layout);
+  CollisionSink sink(lights, layout.channels, layout.unscattered);
   statistics = transport::tracePhotons(medium, lights, options, sink);
-  const std::uint64_t emitted = std::min(
-      options.photonCount, options.photons - std::min(options.firstPhoton, options.photons));
-  return std::make_unique<Map>(medium, layout, emitted, sink);
+  return std::make_unique<Map>(medium, layout, countOf(options), sink);
 }
 
-std::uint64_t predictedPhotons(const Medium& medium, const transport::LightList& lights,
+PhotonForecast forecastPhotons(const Medium& medium, const transport::LightList& lights,
                                bool unscattered, const transport::TraceOptions& options) {
+  const std::uint64_t count = countOf(options);
   transport::TraceOptions few = options;
-  few.firstPhoton = 0;
-  few.photonCount = std::min(options.photons, kForecastPhotons);
-  CountingSink sink(lights, unscattered);
+  few.photonCount = std::min(count, kForecastPhotons);
+  CollisionSink sink(lights, 1, unscattered);
   transport::tracePhotons(medium, lights, few, sink);
-  const double each = static_cast<double>(sink.count()) /
-                      static_cast<double>(std::max<std::uint64_t>(1, few.photonCount));
-  return static_cast<std::uint64_t>(each * static_cast<double>(options.photons));
+  std::vector<Vec3f> positions = sink.take(0).positions();
+  const std::vector<Vec3f> unscatteredPositions = sink.take(1).positions();
+  positions.insert(positions.end(), unscatteredPositions.begin(), unscatteredPositions.end());
+
+  PhotonForecast forecast;
+  const auto found = static_cast<double>(positions.size());
+  forecast.photons =
+      static_cast<std::uint64_t>(found * static_cast<double>(count) /
+                                 static_cast<double>(std::max<std::uint64_t>(1, few.photonCount)));
+  if (positions.empty()) return forecast;
+  // Pairs that share a cell measure the integral of the squared density, whatever their number.
+  const CellGrid cells(positions, kForecastCell * medium.voxelEdge());
+  double pairs = 0;
+  for (const Vec3f& p : positions) {
+    const Vec3i c = glm::clamp(cells.cellOf(p), Vec3i(0), cells.dimensions() - 1);
+    pairs += static_cast<double>(cells.cellEnd(c) - cells.cellBegin(c) - 1);
+  }
+  const double edge = static_cast<double>(cells.edge());
+  forecast.volume = found * (found - 1) * edge * edge * edge / std::max(1.0, pairs);
+  return forecast;
 }
 
 std::uint64_t photonMapBytes(const PhotonMapLayout& layout, std::uint64_t photons) {
@@ -222,14 +218,10 @@ std::uint64_t photonMapBytes(const PhotonMapLayout& layout, std::uint64_t photon
   return photons * (2 * columns + (layout.neighbors > 0 ? 16 : 4 + 16 + 12));
 }
 
-double automaticRadius(const Medium& medium, std::uint64_t stored) {
-  if (medium.bounds().empty()) return 0.0;
+double automaticRadius(const Medium& medium, const PhotonForecast& forecast) {
   const double voxel = medium.voxelEdge();
-  const double edge = 2.0 * voxel;
-  const double smoke =
-      static_cast<double>(transport::SupportLattice(medium, edge, 0).size()) * edge * edge * edge;
-  const double ball =
-      kWantedPhotons * smoke / static_cast<double>(std::max<std::uint64_t>(1, stored));
+  const double ball = kWantedPhotons * forecast.volume /
+                      static_cast<double>(std::max<std::uint64_t>(1, forecast.photons));
   return std::clamp(std::cbrt(ball / (4.0 / 3.0 * kPi)), 0.25 * voxel, 8.0 * voxel);
 }
 

@@ -236,11 +236,6 @@ void buildLayout(const SceneFile& scene, const SetupOptions& options, FrameSetup
   using namespace estimators;
   const ParamValues& e = scene.estimator;
   LightFieldLayout& l = setup.layout;
-  if (e.text("type") == "photosphere" && e.text("kernel") != "none")
-    throw ConfigError(fmt::format(
-        "estimator.kernel = \"{}\" is not served by this version yet for estimator.type = "
-        "\"photosphere\"; it is for \"photon_map\"",
-        e.text("kernel")));
   const std::string& basis = e.text("basis");
   const bool cached = options.forLightCache || !e.text("cache").empty();
   l.carrier = e.text("carrier") == "particles" ? Carrier::particles : Carrier::voxels;

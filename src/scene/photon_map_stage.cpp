@@ -3,23 +3,23 @@
 #include <algorithm>
 
 #include "light_stage.h"
-#include "photosphere/core/error.h"
 #include "photosphere/core/resources.h"
 
 namespace photosphere::scene {
 
 namespace {
 
-using estimators::DirectionKernel;
 using estimators::PhotonMapLayout;
 
 // Radius that the ball of the nearest photons keeps to where none is given [density voxels].
 constexpr double kWidestBall = 8.0;
 
-DirectionKernel directionKernel(const std::string& name) {
-  if (name == "epanechnikov") return DirectionKernel::epanechnikov;
-  if (name == "gaussian") return DirectionKernel::gaussian;
-  return DirectionKernel::none;
+sphere::SmoothingKernel directionKernel(const ParamValues& e) {
+  const std::string& name = e.text("kernel");
+  if (name == "none") return {};
+  return {
+      name == "gaussian" ? sphere::AngularKernel::gaussian : sphere::AngularKernel::epanechnikov,
+      e.real("bandwidth"), e.real("truncation")};
 }
 
 std::uint32_t neighbors(const ParamValues& e) {
@@ -49,30 +49,23 @@ estimators::SpatialKernel spatialKernel(const std::string& name) {
 
 void planPhotonMap(const SceneFile& scene, FrameSetup& setup) {
   const ParamValues& e = scene.estimator;
-  if (e.text("type") != "photon_map") return;
-  if (!e.text("cache").empty())
-    throw ConfigError(
-        "estimator.cache holds the light of estimator.type = \"photosphere\"; a photon map is "
-        "traced for each frame");
-  if (!storesLight(scene, setup)) return;
+  if (e.text("type") != "photon_map" || !storesLight(scene, setup)) return;
   PhotonMapLayout& map = setup.photonMap.emplace();
   map.kernel = spatialKernel(e.text("spatial_kernel"));
   map.neighbors = neighbors(e);
   map.passes = static_cast<int>(e.integer("passes"));
   map.channels = setup.layout.channels;
   map.unscattered = setup.layout.unscattered;
-  map.directionKernel = directionKernel(e.text("kernel"));
-  map.bandwidth = e.real("bandwidth");
-  map.truncation = e.real("truncation");
-  setup.photonMapPhotons = estimators::predictedPhotons(
+  map.directionKernel = directionKernel(e);
+  const estimators::PhotonForecast forecast = estimators::forecastPhotons(
       *setup.medium, setup.lights, map.unscattered, traceOptions(scene, setup, 0));
+  setup.photonMapPhotons = forecast.photons;
   map.radius = e.real("radius") * setup.space.metersPerUnit;
   if (map.radius > 0) return;
   // Where the nearest photons make the radius, the automatic one only keeps it from growing over
   // empty space.
-  map.radius = e.integer("neighbors") > 0
-                   ? kWidestBall * setup.medium->voxelEdge()
-                   : estimators::automaticRadius(*setup.medium, setup.photonMapPhotons);
+  map.radius = e.integer("neighbors") > 0 ? kWidestBall * setup.medium->voxelEdge()
+                                          : estimators::automaticRadius(*setup.medium, forecast);
 }
 
 std::unique_ptr<estimators::PhotonMap> photonMapPass(const SceneFile& scene,

@@ -2,6 +2,7 @@
 
 #include "photosphere/estimators/photon_set.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -18,7 +19,6 @@ namespace {
 using estimators::Lobe;
 using estimators::PhotonColumns;
 using estimators::PhotonSet;
-using estimators::SmoothedPhase;
 using estimators::SpatialKernel;
 
 constexpr SpatialKernel kKernels[] = {SpatialKernel::epanechnikov, SpatialKernel::box,
@@ -110,14 +110,24 @@ std::vector<Vec3f> queries(const PhotonColumns& photons) {
   return points;
 }
 
-void expectNear(const Rgb& fast, const Vec3d& slow, double tolerance, const std::string& what) {
+void expectNear(const Rgb& fast, const Vec3d& slow, double absolute, const std::string& what) {
   for (int c = 0; c < 3; ++c)
-    EXPECT_NEAR(static_cast<double>(fast[c]), slow[c], tolerance * std::max(slow[c], 1e-12))
+    EXPECT_NEAR(static_cast<double>(fast[c]), slow[c], 1e-3 * slow[c] + absolute)
         << what << ", channel " << c;
 }
 
+std::shared_ptr<const sphere::ZonalTable> smoothed(double g, double h) {
+  const phase::HenyeyGreenstein phase(g);
+  const auto moments = sphere::phaseMoments(
+      [&](const Vec3f& w, const Vec3f& wo) { return static_cast<double>(phase.evaluate(w, wo)); });
+  const sphere::SmoothingKernel kernel(sphere::AngularKernel::gaussian, h, 3.0);
+  return std::make_shared<sphere::ZonalTable>(
+      sphere::convolved(moments, sphere::kernelMoments(kernel, moments.size())));
+}
+
 TEST(PhotonSetTest, FixedRadiusIsTheSumOverAllPhotons) {
-  const Lobe lobe{phase::HenyeyGreenstein(0.6), nullptr};
+  const Lobe lobes[] = {{phase::HenyeyGreenstein(0.6), nullptr},
+                        {phase::HenyeyGreenstein(0.6), smoothed(0.6, 0.5)}};
   const Vec3f wo = glm::normalize(Vec3f(0.3f, -0.5f, 0.8f));
   for (const Cloud& cloud : clouds())
     for (const int channels : {1, 3})
@@ -125,6 +135,7 @@ TEST(PhotonSetTest, FixedRadiusIsTheSumOverAllPhotons) {
         for (const double radius : {1e-4, 0.1, 0.37, 4000.0}) {
           const PhotonColumns photons = makePhotons(cloud.count, channels, cloud.place);
           const auto set = makeFixedRadiusSet(photons, kernel, radius);
+          const Lobe& lobe = lobes[channels == 1];
           ASSERT_EQ(set->photons().count, photons.count);
           for (const Vec3f& p : queries(photons)) {
             // Photons at the ball's surface to rounding may fall on either side of it.
@@ -181,10 +192,18 @@ TEST(PhotonSetTest, NearestAreThoseOfASortedList) {
           distances.push_back(glm::length(Vec3d(photons.positionOf(i) - p)));
         std::sort(distances.begin(), distances.end());
         const double next = k < distances.size() ? distances[k] : limit;
-        const double radius = std::clamp(next, 1e-3 * limit, limit);
+        if (next < 1e-3 * limit) {
+          // More than k photons at one point: which of them count is open, the answer stays finite.
+          EXPECT_LT(maxComponent(set->scattered(p, wo, lobe)), kInfinity) << cloud.name;
+          continue;
+        }
+        const double radius = std::min(next, limit);
+        // Of photons at the very end of the ball, whose weight is nothing up to rounding.
+        const double absolute = 1e-6 * static_cast<double>(photons.count) /
+                                estimators::kernelVolume(SpatialKernel::epanechnikov, radius);
         next < limit ? ++ended : ++limited;
         expectNear(set->scattered(p, wo, lobe),
-                   slowSum(photons, SpatialKernel::epanechnikov, radius, p, wo, lobe), 2e-3,
+                   slowSum(photons, SpatialKernel::epanechnikov, radius, p, wo, lobe), absolute,
                    cloud.name + fmt::format(", k {}", k));
       }
     }
@@ -211,17 +230,11 @@ TEST(PhotonSetTest, NearestEstimateTheDensityWithoutBias) {
   }
 }
 
-std::shared_ptr<const SmoothedPhase> smoothed(double g, double h) {
-  return std::make_shared<SmoothedPhase>(
-      phase::HenyeyGreenstein(g), [h](double t) { return std::exp(-0.5 * t * t / (h * h)); },
-      3 * h);
-}
-
 // Over all of space and all directions a lookup gives back each photon's power.
 TEST(PhotonSetTest, LookupsKeepTheEnergy) {
   const PhotonColumns photons = makePhotons(1, 3, [](int, Rng&) { return Vec3f(0.1f); });
   const double radius = 0.5;
-  const int points = kSanitized ? 20'000 : 400'000;
+  const int points = kSanitized ? 20'000 : 200'000;
   for (const SpatialKernel kernel : kKernels)
     for (const Lobe& lobe : {Lobe{phase::HenyeyGreenstein(0.5), nullptr},
                              Lobe{phase::HenyeyGreenstein(0.5), smoothed(0.5, 0.4)}}) {
@@ -234,51 +247,8 @@ TEST(PhotonSetTest, LookupsKeepTheEnergy) {
       }
       const Vec3d ratio = sum / double(points) * 4.0 * kPi / Vec3d(photons.powerOf(0));
       for (int c = 0; c < 3; ++c)
-        EXPECT_NEAR(ratio[c], 1.0, kSanitized ? 0.1 : 0.02);
+        EXPECT_NEAR(ratio[c], 1.0, kSanitized ? 0.1 : 0.03);
     }
-}
-
-// The smoothed phase function is the mean of the phase function over the kernel's directions.
-TEST(SmoothedPhaseTest, IsTheMeanOverTheKernel) {
-  Rng rng(RandomKey::fromSeed(15, 0), RandomStream::test, 0);
-  for (const double g : {-0.6, 0.0, 0.4, 0.85})
-    for (const double h : {0.1, 0.5, 1.5}) {
-      const auto phase = smoothed(g, h);
-      const phase::HenyeyGreenstein sharp(g);
-      const double support = std::min(3 * h, kPi);
-      for (const double angle : {0.0, 0.2, 0.9, 2.0, 3.1}) {
-        const Vec3f wo(static_cast<float>(std::sin(angle)), 0, static_cast<float>(std::cos(angle)));
-        double sum = 0, weight = 0;
-        const int rings = kSanitized ? 60 : 400, turns = 64;
-        for (int i = 0; i < rings; ++i)
-          for (int j = 0; j < turns; ++j) {
-            const double t = (i + 0.5) * support / rings, phi = (j + 0.5) * 2 * kPi / turns;
-            const double w = std::sin(t) * std::exp(-0.5 * t * t / (h * h));
-            sum += w * static_cast<double>(
-                           sharp.evaluate(Vec3f(Vec3d(std::sin(t) * std::cos(phi),
-                                                      std::sin(t) * std::sin(phi), std::cos(t))),
-                                          wo));
-            weight += w;
-          }
-        const double mean = sum / weight;
-        EXPECT_NEAR(static_cast<double>(phase->evaluate({0, 0, 1}, wo)), mean, 2e-3 * mean + 1e-5)
-            << "g " << g << ", h " << h << ", angle " << angle;
-      }
-    }
-}
-
-TEST(SmoothedPhaseTest, ANarrowKernelLeavesThePhaseFunction) {
-  Rng rng(RandomKey::fromSeed(16, 0), RandomStream::test, 0);
-  for (const double g : {0.0, 0.7, 0.95}) {
-    const auto phase = smoothed(g, 1e-3);
-    const phase::HenyeyGreenstein sharp(g);
-    for (int i = 0; i < 200; ++i) {
-      const Vec3f wi = randomDirection(rng);
-      const Vec3f wo = i % 2 ? sharp.sample(wi, rng.uniform2()) : randomDirection(rng);
-      const auto expected = static_cast<double>(sharp.evaluate(wi, wo));
-      EXPECT_NEAR(static_cast<double>(phase->evaluate(wi, wo)), expected, 3e-3 * expected);
-    }
-  }
 }
 
 }  // namespace

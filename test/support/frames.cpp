@@ -120,10 +120,10 @@ PhotosphereFrame renderPhotonMap(const TestScene& scene, estimators::PhotonMapLa
   if (layout.radius == 0)
     layout.radius = estimators::automaticRadius(
         *scene.medium,
-        estimators::predictedPhotons(*scene.medium, scene.lights, layout.unscattered, options));
+        estimators::forecastPhotons(*scene.medium, scene.lights, layout.unscattered, options));
   const Stopwatch trace;
-  const auto map = estimators::tracePhotonMap(*scene.medium, scene.lights, layout, options,
-                                              frame.statistics);
+  const auto map =
+      estimators::tracePhotonMap(*scene.medium, scene.lights, layout, options, frame.statistics);
   frame.traceSeconds = trace.seconds();
   marchFrame(scene, *map, seed, samples, frame);
   return frame;

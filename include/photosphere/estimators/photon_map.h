@@ -8,12 +8,10 @@
 #include "photosphere/core/types.h"
 #include "photosphere/estimators/inscatter.h"
 #include "photosphere/estimators/light_field.h"
+#include "photosphere/sphere/smoothing.h"
 #include "photosphere/transport/photon_tracer.h"
 
 namespace photosphere::estimators {
-
-/// Kernel that spreads the direction of a photon (eq. 8 on photons, figure 11).
-enum class DirectionKernel { none, epanechnikov, gaussian };
 
 /// How photons are stored and looked up.
 struct PhotonMapLayout {
@@ -24,10 +22,8 @@ struct PhotonMapLayout {
   int channels = 3;             ///< 1 where lights and media are grey
   bool unscattered =
       false;  ///< photons of lamps with extent are kept from their first collision, apart
-  DirectionKernel directionKernel = DirectionKernel::none;
-  double bandwidth = 0.5;   ///< of `directionKernel` [radians]
-  double truncation = 3.0;  ///< where `directionKernel` is cut [bandwidths]
-  int passes = 1;           ///< of a progressive map; each is a map of its own, of a smaller radius
+  sphere::SmoothingKernel directionKernel;  ///< spreads each photon's direction (figure 11)
+  int passes = 1;  ///< of a progressive map; each is a map of its own, of a smaller radius
 };
 
 /// Photons at their collisions. Their density is sigma_t times fluence, so the source they give is
@@ -48,18 +44,21 @@ std::unique_ptr<PhotonMap> tracePhotonMap(const transport::Medium& medium,
                                           const transport::TraceOptions& options,
                                           transport::TraceStatistics& statistics);
 
-/// Photons that a map of `options.photons` would store, from tracing a few thousand of them; the
-/// error is a few percent.
-std::uint64_t predictedPhotons(const transport::Medium& medium, const transport::LightList& lights,
+/// What a map will be like, from tracing a few thousand of its photons.
+struct PhotonForecast {
+  std::uint64_t photons = 0;  ///< that a map of `options.photonCount` stores, within a few percent
+  double volume = 0.0;  ///< that as many photons would fill at the density that the mean photon
+                        ///< has about it [m^3]
+};
+PhotonForecast forecastPhotons(const transport::Medium& medium, const transport::LightList& lights,
                                bool unscattered, const transport::TraceOptions& options);
 
 /// Bytes at the most, while it is built, of a map of that many photons.
 std::uint64_t photonMapBytes(const PhotonMapLayout& layout, std::uint64_t photons);
 
-/// The radius that `radius = 0` stands for [m]: wide enough that its ball holds a few hundred
-/// photons where they are spread evenly over the smoke, between one density voxel and eight.
-/// @param stored  photons in the map
-double automaticRadius(const transport::Medium& medium, std::uint64_t stored);
+/// The radius that `radius = 0` stands for [m]: wide enough that its ball holds a few tens of
+/// photons where the mean photon is, between a quarter of a density voxel and eight.
+double automaticRadius(const transport::Medium& medium, const PhotonForecast& forecast);
 
 /// Radius of pass `pass` (from 0) of a progressive map over that of the first: the volume of the
 /// ball shrinks by (i + a) / (i + 1) from pass i to the next, a = 2/3, so that the error of the

@@ -8,8 +8,8 @@
 
 #include "photosphere/core/types.h"
 #include "photosphere/estimators/light_field.h"
-#include "photosphere/estimators/smoothed_phase.h"
 #include "photosphere/phase/phase.h"
+#include "photosphere/sphere/zonal.h"
 
 namespace photosphere::estimators {
 
@@ -46,10 +46,12 @@ struct PhotonColumns {
 /// A phase function as sums over photons read it.
 struct Lobe {
   phase::HenyeyGreenstein phase;
-  std::shared_ptr<const SmoothedPhase> smoothed;  ///< replaces `phase` where there is one
+  /// The phase function averaged over the lobe that direction smoothing makes of a photon: the
+  /// convolution of both (eq. 8 on photons). Replaces `phase` where there is one.
+  std::shared_ptr<const sphere::ZonalTable> smoothed;
 
   float evaluate(const Vec3f& wi, const Vec3f& wo) const {
-    return smoothed ? smoothed->evaluate(wi, wo) : phase.evaluate(wi, wo);
+    return smoothed ? (*smoothed)(wi, wo) : phase.evaluate(wi, wo);
   }
 };
 
