@@ -73,13 +73,12 @@ std::uint64_t countAttribute(const fs::path& path, const image::ExrAttributes& a
   return std::stoull(*text);
 }
 
-// The shipped file whose name ends with the key, or an empty path.
-fs::path shippedReference(const std::string& key) {
-  const fs::path folder = shippedStudies();
+// The file whose name ends with the key, or an empty path.
+fs::path referenceIn(const fs::path& folder, const std::string& key) {
   if (folder.empty()) return {};
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(folder, error))
-    if (entry.path().extension() == ".exr" && entry.path().stem().string().ends_with(key))
+    if (entry.path().extension() == ".exr" && entry.path().stem().string().ends_with("-" + key))
       return entry.path();
   return {};
 }
@@ -172,8 +171,10 @@ ReferenceMaker::ReferenceMaker(scene::SceneFile pathTraced, std::int64_t frame, 
       m_folder(std::move(folder)),
       m_file(m_folder / fmt::format("{}-{}.exr", fileStem(name), m_key)),
       m_chunk(chunk) {
+  // Another scene's study may have made it under that scene's name.
+  if (const fs::path found = referenceIn(m_folder, m_key); !found.empty()) m_file = found;
   load(m_file);
-  if (m_image.empty()) load(shippedReference(m_key));
+  if (m_image.empty()) load(referenceIn(shippedStudies(), m_key));
 }
 
 void ReferenceMaker::load(const fs::path& path) {

@@ -26,6 +26,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::uint64_t kParticles = 60'000;
+constexpr double kMinutes = 10, kQuickMinutes = 0.1;
 constexpr int kQuickEdge = 32;
 constexpr int kHardEdge = 128;
 
@@ -76,7 +77,9 @@ class Study {
       : m_options(options),
         m_cache(options.cache.empty() ? options.output / "cache" : options.cache),
         m_runs(m_cache / fmt::format("runs-{}", getpid())),
-        m_seconds(60 * options.minutes) {
+        m_seconds(60 * (options.minutes > 0 ? options.minutes
+                        : options.quick     ? kQuickMinutes
+                                            : kMinutes)) {
     if (options.seeds < 3)
       throw ConfigError("--seeds: at least 3, as bias and variance need independent frames");
     m_source.path = options.scene;
@@ -128,8 +131,9 @@ class Study {
     result.version = versionText();
     result.machine = machineName();
     result.date = image::currentCapDate();
+    result.renderingSpace = m_source.open().output.text("colorspace");
     result.threads = m_options.threads;
-    result.minutes = m_options.minutes;
+    result.minutes = m_seconds / 60;
     result.quick = m_options.quick;
     measureStart(result);
   }

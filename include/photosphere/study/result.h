@@ -108,6 +108,7 @@ struct StudyResult {
   std::int64_t frame = 1;
   std::string version, machine, date;
   unsigned threads = 0;
+  std::string renderingSpace;
   double minutes = 0, elapsedSeconds = 0;
   bool quick = false;
   Spread startSeconds;  ///< a child process that does nothing: its start and end

@@ -18,7 +18,7 @@ struct StudyOptions {
   std::filesystem::path output;       ///< folder of the report
   std::filesystem::path cache;        ///< folder of references; empty = `output`/cache
   std::vector<std::int64_t> frames;   ///< the last is studied; flicker moves over all
-  double minutes = 10;                ///< that the study should take at most, about
+  double minutes = 0;                 ///< that the study should take, about; 0 = 10, quick 0.1
   int seeds = 5;                      ///< at least 3
   std::vector<std::string> families;  ///< of contenders; empty = all
   bool hardCases = true, flicker = true;
