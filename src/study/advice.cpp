@@ -33,7 +33,8 @@ Best bestAt(const std::vector<Curve>& curves, double seconds, const Accept& acce
 }
 
 std::string percent(double error) {
-  return fmt::format("{:.2g} %", 100 * error);
+  return 100 * error < 10 ? fmt::format("{:.2g} %", 100 * error)
+                          : fmt::format("{:.0f} %", 100 * error);
 }
 
 std::string time(double seconds) {
@@ -120,13 +121,39 @@ void addMemory(const SweepResult& sweep, std::vector<std::string>& out) {
 void addHardCases(const StudyResult& result, std::vector<std::string>& out) {
   for (std::size_t i = 1; i < result.sweeps.size(); ++i) {
     const SweepResult& sweep = result.sweeps[i];
-    const Verdict v = verdictOf(sweep);
-    if (!v.known) continue;
-    const bool lost = v.rivalError < v.ourError;
-    out.push_back(fmt::format("{} ({}): at {} the photosphere {}: {} with {}, {} with {}.",
-                              sweep.name, sweep.description, time(v.seconds),
-                              lost ? "loses" : "holds", v.ours, percent(v.ourError), v.rival,
-                              percent(v.rivalError)));
+    for (const std::size_t layer : {kTotal, kMultiple}) {
+      const Verdict v = verdictOf(sweep, layer);
+      if (!v.known) continue;
+      std::string path;
+      if (v.pathSeconds > 0)
+        path = fmt::format(" Path tracing would have the photosphere's error after about {}.",
+                           time(v.pathSeconds));
+      out.push_back(
+          fmt::format("{} ({}), layer {}: at {} the photosphere {}: {} with {}, {} with {}.{}",
+                      sweep.name, sweep.description, kLayers[layer], time(v.seconds),
+                      v.rivalError < v.ourError ? "loses" : "holds", v.ours, percent(v.ourError),
+                      v.rival, percent(v.rivalError), path));
+    }
+  }
+}
+
+// A reference that is too poor says so here.
+void addReferenceChecks(const StudyResult& result, std::vector<std::string>& out) {
+  for (const SweepResult& sweep : result.sweeps) {
+    const double spread = sweep.reference.pathNoise[kMultiple];
+    const double claimed = sweep.reference.noise[kMultiple];
+    if (spread > 3 * claimed)
+      out.push_back(fmt::format(
+          "{}: the reference is not to be relied on in layer multiple: from the spread of path "
+          "traced frames its relMSE should be about {:.2g}, where its own halves say {:.2g}; rare "
+          "bright paths are still missing. Give it more --minutes.",
+          sweep.name, spread, claimed));
+    else if (!sweep.reference.targetReached)
+      out.push_back(fmt::format(
+          "{}: the reference's noise (relMSE {:.2g} in layer multiple) is above a tenth "
+          "of the best contender's error; it is subtracted, but more --minutes would "
+          "make it surer.",
+          sweep.name, std::max(spread, claimed)));
   }
 }
 
@@ -153,23 +180,27 @@ void addFlicker(const StudyResult& result, std::vector<std::string>& out) {
 
 }  // namespace
 
-Verdict verdictOf(const SweepResult& sweep) {
+Verdict verdictOf(const SweepResult& sweep, std::size_t layer) {
   Verdict verdict;
-  const std::vector<Curve> curves = curvesOf(sweep, kMultiple, kAllPixels);
+  const std::vector<Curve> curves = curvesOf(sweep, layer, kAllPixels);
   for (const Curve& curve : curves)
     if (isPhotosphere(curve.family))
       verdict.seconds = std::max(verdict.seconds, curve.points.back().seconds);
   const Best ours =
       bestAt(curves, verdict.seconds, [](const Curve& c) { return isPhotosphere(c.family); });
-  const Best rival = bestAt(curves, verdict.seconds, [](const Curve& c) {
-    return !isPhotosphere(c.family) && c.family != "single";
-  });
+  const Best rival =
+      bestAt(curves, verdict.seconds, [](const Curve& c) { return !isPhotosphere(c.family); });
   if (!ours.curve || !rival.curve) return verdict;
   verdict.ours = ours.curve->title;
   verdict.rival = rival.curve->title;
   verdict.ourError = ours.error;
   verdict.rivalError = rival.error;
   verdict.known = true;
+  for (const Curve& curve : curves)
+    if (curve.family == "path_traced") {
+      const CurvePoint& last = curve.points.back();
+      verdict.pathSeconds = last.seconds * std::pow(last.error / ours.error, 2);
+    }
   return verdict;
 }
 
@@ -184,6 +215,7 @@ std::vector<std::string> advice(const StudyResult& result) {
   addMemory(sweep, out);
   addHardCases(result, out);
   addFlicker(result, out);
+  addReferenceChecks(result, out);
   return out;
 }
 

@@ -16,10 +16,12 @@ struct Verdict {
   double seconds = 0;       ///< at which both are compared
   std::string ours, rival;  ///< titles of the best of each
   double ourError = 0, rivalError = 0;
+  /// Until path tracing has our error, its squared error falling as 1 / time from its last point;
+  /// 0 where it was not measured.
+  double pathSeconds = 0;
   bool known = false;  ///< false where there is nothing to compare
 };
-/// Compared at the time of the slowest photosphere point of the sweep, in layer `multiple`, over
-/// all pixels: what light carriers are for.
-Verdict verdictOf(const SweepResult& sweep);
+/// Compared at the time of the slowest photosphere point of the sweep, over all pixels.
+Verdict verdictOf(const SweepResult& sweep, std::size_t layer);
 
 }  // namespace photosphere::study

@@ -1,6 +1,7 @@
 #include "child.h"
 
 #include <fmt/format.h>
+#include <malloc.h>
 #include <poll.h>
 #include <signal.h>
 #include <sys/wait.h>
@@ -143,6 +144,7 @@ ChildResult runInChild(const std::function<std::string()>& work) {
     throw Error(ExitCode::unspecified,
                 fmt::format("no pipe to a child process: {}", std::strerror(errno)));
   const Stopwatch watch;
+  malloc_trim(0);  // what this process no longer uses would count as the child's memory
   const pid_t child = fork();
   if (child < 0) {
     const int why = errno;

@@ -24,6 +24,7 @@ CurvePoint pointOf(const PointResult& p, std::size_t layer, std::size_t region) 
   point.low = std::isfinite(f.relMse.low) ? root(f.relMse.low) : point.error;
   point.high = std::isfinite(f.relMse.high) ? root(f.relMse.high) : point.error;
   point.label = p.label;
+  point.work = p.work;
   return point;
 }
 
@@ -64,16 +65,21 @@ void addCrossovers(const Curve& a, const Curve& b, std::vector<Crossover>& out) 
   if (a.points.empty() || b.points.empty()) return;
   const std::vector<double> knots = sharedKnots(a, b);
   const auto gap = [&](double t) { return std::log(*errorAt(a, t) / *errorAt(b, t)); };
-  for (std::size_t i = 0; i + 1 < knots.size(); ++i) {
-    double low = knots[i], high = knots[i + 1];
-    const double atLow = gap(low), atHigh = gap(high);
-    if (!(atLow * atHigh < 0)) continue;
-    for (int step = 0; step < 60; ++step) {
-      const double middle = std::sqrt(low * high);
-      (gap(middle) * atLow > 0 ? low : high) = middle;
+  double before = knots.front(), gapBefore = gap(before);
+  for (const double knot : knots) {
+    const double gapHere = gap(knot);
+    if (gapHere == 0) continue;  // they touch here: what follows says whether they cross
+    if (gapBefore * gapHere < 0) {
+      double low = before, high = knot;
+      for (int step = 0; step < 60; ++step) {
+        const double middle = std::sqrt(low * high);
+        (gap(middle) * gapBefore > 0 ? low : high) = middle;
+      }
+      out.push_back({gapBefore < 0 ? a.title : b.title, gapBefore < 0 ? b.title : a.title, low,
+                     *errorAt(a, low)});
     }
-    out.push_back(
-        {atLow < 0 ? a.title : b.title, atLow < 0 ? b.title : a.title, low, *errorAt(a, low)});
+    before = knot;
+    gapBefore = gapHere;
   }
 }
 
@@ -92,6 +98,8 @@ std::vector<double> roundNumbers(double low, double high) {
 std::vector<Curve> curvesOf(const SweepResult& sweep, std::size_t layer, std::size_t region) {
   std::vector<Curve> curves;
   for (const PointResult& p : sweep.points) {
+    // Single scattering alone says nothing of the other: black is no estimate of it.
+    if (layer == kMultiple && p.family == "single") continue;
     auto found = std::find_if(curves.begin(), curves.end(),
                               [&](const Curve& c) { return c.family == p.family; });
     if (found == curves.end())

@@ -13,6 +13,7 @@ struct CurvePoint {
   double seconds = 0, secondsMin = 0, secondsMax = 0;  ///< of a frame
   double error = 0, low = 0, high = 0;                 ///< relative error [1], 95 % interval
   std::string label;
+  std::int64_t work = 0;
   bool onFront = false;  ///< no other point of the sweep is both faster and better
 };
 

@@ -15,14 +15,14 @@ struct FlickerPlan {
   SceneSource scene;
   std::int64_t frame = 1;            ///< of the still scene
   std::vector<std::int64_t> moving;  ///< frames of the moving one; fewer than 2: none
-  int stillFrames = 4;
+  int stillFrames = 3;
   int seeds = 3;
   bool quick = false;
   std::vector<std::string> particleSets;
   std::filesystem::path cacheFolder, runFolder;
   std::string referenceName;
   int chunk = 64;
-  double seconds = 0;  ///< budget for the references of the moving frames
+  double seconds = 0;  ///< budget; what does not fit is left out
 };
 
 /// relMSE of the difference of the errors of two frames: of (b - a) - (referenceB - referenceA)

@@ -51,8 +51,8 @@ body { font: 16px/1.5 sans-serif; color: #111; background: #fff; max-width: 76re
        padding: 0 1rem; }
 h1 { font-size: 1.6rem; } h2 { font-size: 1.3rem; margin-top: 2.5rem; }
 h3 { font-size: 1.1rem; margin-top: 1.8rem; }
-table { border-collapse: collapse; margin: 1rem 0; font-size: 0.85rem; }
-caption { text-align: left; font-weight: bold; padding: 0.3rem 0; }
+table { border-collapse: collapse; margin: 0 0 1rem; font-size: 0.85rem; }
+.caption { font-weight: bold; font-size: 0.9rem; margin: 1rem 0 0.3rem; }
 th, td { border-bottom: 1px solid #bbb; padding: 0.2rem 0.6rem; text-align: left;
          vertical-align: top; }
 th { border-bottom: 2px solid #111; vertical-align: bottom; }
@@ -115,8 +115,10 @@ std::string pictureTag(const std::string& png, const std::string& alternative, i
 }
 
 std::string tableTag(const Table& table) {
-  std::string text = "<div class=\"wide\"><table>\n";
-  if (!table.caption.empty()) text += "<caption>" + escape(table.caption) + "</caption>\n";
+  // A caption of the table's own would be as narrow as a narrow table.
+  std::string text;
+  if (!table.caption.empty()) text += "<p class=\"caption\">" + escape(table.caption) + "</p>\n";
+  text += "<div class=\"wide\"><table>\n";
   for (std::size_t r = 0; r < table.rows.size(); ++r) {
     const char* tag = r == 0 ? "th" : "td";
     text += "<tr>";
@@ -137,8 +139,9 @@ std::string inlineSvg(const std::string& svg, const std::string& prefix,
   dropAttribute(text, "xmlns");
   dropAttribute(text, "xmlns:xlink");
   replaceAll(text, "xlink:href", "href");
-  replaceAll(text, " id=\"", " id=\"" + prefix);
   for (const char quote : {'"', '\''}) {
+    const std::string id = fmt::format(" id={}", quote);
+    replaceAll(text, id, id + prefix);
     const std::string link = fmt::format("href={}#", quote);
     replaceAll(text, link, link + prefix);
   }

@@ -104,21 +104,6 @@ std::string errorTables(const SweepResult& sweep) {
   return text;
 }
 
-// The point of each family with the most work.
-std::vector<const PointResult*> strongest(const SweepResult& sweep) {
-  std::vector<const PointResult*> best;
-  for (const PointResult& p : sweep.points) {
-    const auto found = std::find_if(best.begin(), best.end(), [&](const PointResult* other) {
-      return other->family == p.family;
-    });
-    if (found == best.end())
-      best.push_back(&p);
-    else if (p.work > (*found)->work)
-      *found = &p;
-  }
-  return best;
-}
-
 std::string pictures(const SweepResult& sweep, const PictureSettings& settings, bool allFamilies) {
   const int zoom = std::max(1, 320 / std::max(1, sweep.width));
   const int w = sweep.width * zoom, h = sweep.height * zoom;
@@ -128,12 +113,13 @@ std::string pictures(const SweepResult& sweep, const PictureSettings& settings, 
                             "reference of " + sweep.name, w, h),
                  fmt::format("reference, {} samples a pixel, exposure {:+.1f} stops",
                              sweep.reference.samples, exposure));
-  for (const PointResult* p : strongest(sweep)) {
-    if (!allFamilies && p->family != "view" && p->family != "path_traced") continue;
-    text += figure(pictureTag(framePicture(p->frame, exposure, settings), p->label, w, h) +
-                       pictureTag(errorMapPicture(p->frame, sweep.referenceImage),
-                                  "error map of " + p->label, w, h),
-                   fmt::format("{}; below, its error", p->label));
+  for (const PointResult& p : sweep.points) {
+    if (p.frame.channels().empty()) continue;  // not the family's most work
+    if (!allFamilies && p.family != "view" && p.family != "path_traced") continue;
+    text += figure(pictureTag(framePicture(p.frame, exposure, settings), p.label, w, h) +
+                       pictureTag(errorMapPicture(p.frame, sweep.referenceImage),
+                                  "error map of " + p.label, w, h),
+                   fmt::format("{}; below, its error", p.label));
   }
   text += "</div>\n";
   return text +

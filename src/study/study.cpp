@@ -31,7 +31,7 @@ constexpr int kQuickEdge = 32;
 constexpr int kHardEdge = 128;
 
 // Parts of the time, of what is left when each begins.
-constexpr double kMeasureShare = 0.33, kReferenceShare = 0.45, kHardShare = 0.75;
+constexpr double kMeasureShare = 0.35, kReferenceShare = 0.45, kHardShare = 0.6;
 
 std::string machineName() {
   std::ifstream info("/proc/cpuinfo");
@@ -200,14 +200,14 @@ class Study {
     flicker.scene = m_source;
     flicker.frame = m_frame;
     flicker.moving = m_frames;
-    flicker.stillFrames = m_options.quick ? 2 : 4;
+    if (m_options.quick) flicker.stillFrames = 2;
     flicker.quick = m_options.quick;
     flicker.particleSets = m_particles;
     flicker.cacheFolder = m_cache;
     flicker.runFolder = m_runs.path();
     flicker.referenceName = name();
     flicker.chunk = m_options.quick ? 4 : 64;
-    flicker.seconds = 0.5 * left();
+    flicker.seconds = left();
     result.flicker = measureFlicker(flicker, result.leftOut);
   }
 

@@ -41,6 +41,16 @@ Spread spreadOver(const std::vector<RenderOutcome>& runs, const Function& value)
   return spreadOf(values);
 }
 
+// Colour alone: what this process keeps in memory, its children begin with.
+image::Image pictureOf(const image::Image& frame) {
+  image::Image picture(frame.width(), frame.height());
+  for (const char* letter : {"R", "G", "B"}) {
+    const auto from = frame.channel(letter);
+    std::copy(from.begin(), from.end(), picture.addChannel(letter).begin());
+  }
+  return picture;
+}
+
 std::string settingsText(const std::vector<std::string>& sets) {
   return fmt::format("{}", fmt::join(sets, "; "));
 }
@@ -90,9 +100,14 @@ void Sweep::run(Entry& entry, int seed) {
 // measured.
 bool Sweep::affordable(const Entry& entry, double elapsed, double& predicted) const {
   predicted = 0;
-  for (const Entry& other : m_entries)
-    if (other.contender.family == entry.contender.family && !other.runs.empty())
-      predicted = kLevelGrowth * other.runs[0].seconds.total;
+  double before = 0;  // of the level before the last; what does not grow cancels in the difference
+  for (const Entry& other : m_entries) {
+    if (other.contender.family != entry.contender.family || other.runs.empty()) continue;
+    const double last = other.runs[0].seconds.total;
+    predicted =
+        before > 0 ? last + kLevelGrowth * std::max(0.0, last - before) : kLevelGrowth * last;
+    before = last;
+  }
   if (predicted == 0) return true;
   const double committed = secondsOfRound() * (m_plan.seeds - 1);
   return elapsed + committed + predicted * m_plan.seeds <= m_plan.measureSeconds;
@@ -126,6 +141,8 @@ void Sweep::measureFirst(const Stopwatch& watch) {
 void Sweep::measure() {
   std::error_code ignored;
   fs::create_directories(m_plan.runFolder, ignored);
+  const ChildResult start = runInChild([] { return std::to_string(peakMemoryBytes()); });
+  if (!start.failed) m_startMemory = std::stoull(start.text);
   const Stopwatch watch;
   measureFirst(watch);
   const double round = secondsOfRound();
@@ -164,13 +181,38 @@ std::array<double, 2> Sweep::bestErrors() const {
   return best;
 }
 
+std::array<double, 2> Sweep::pathNoise() const {
+  std::array<double, 2> noise{};
+  const ReferenceImage& reference = m_reference->image();
+  const Entry* path = nullptr;
+  for (const Entry& entry : m_entries)
+    if (!entry.dropped && entry.images.size() >= 2 && entry.contender.family->work == Work::samples)
+      path = &entry;  // levels ascend: the last has the most samples
+  if (!path || reference.empty()) return noise;
+  std::vector<image::Image> frames;
+  for (const fs::path& file : path->images)
+    frames.push_back(image::readExr(file).image);
+  for (std::size_t layer = 0; layer < kLayers.size(); ++layer) {
+    std::vector<Planes> seeds;
+    for (const image::Image& frame : frames)
+      seeds.push_back(layersOf(frame)[layer]);
+    const double variance =
+        errorFigures(seeds, reference.mean(layer), reference.variance(layer), {}).variance.value;
+    noise[layer] = variance * static_cast<double>(path->contender.work) /
+                   static_cast<double>(reference.samples);
+  }
+  return noise;
+}
+
 double Sweep::stillNeeded() const {
   const ReferenceImage& reference = m_reference->image();
   if (reference.pairs < 2) return 2;  // a variance from one pair alone says too little
-  const auto noise = reference.noise(), best = bestErrors();
+  // Outliers of the reference hide in their own denominators: the worse estimate counts.
+  auto noise = reference.noise();
+  const auto spread = pathNoise(), best = bestErrors();
   double factor = 0;
   for (std::size_t layer = 0; layer < kLayers.size(); ++layer)
-    if (noise[layer] > 0)
+    if (noise[layer] = std::max(noise[layer], spread[layer]); noise[layer] > 0)
       factor = std::max(factor, best[layer] > 0 ? noise[layer] / (kNoiseShare * best[layer]) : 4.0);
   return factor;
 }
@@ -198,6 +240,15 @@ void Sweep::refine() {
       if (part > reported) progress.add(part - std::exchange(reported, part));
     }
   }
+}
+
+// Whether no other contender of its family did more work: only those are shown.
+bool Sweep::strongest(const Entry& entry) const {
+  return std::none_of(m_entries.begin(), m_entries.end(), [&](const Entry& other) {
+    return !other.dropped && !other.runs.empty() &&
+           other.contender.family == entry.contender.family &&
+           other.contender.work > entry.contender.work;
+  });
 }
 
 PointResult Sweep::evaluate(const Entry& entry,
@@ -231,7 +282,7 @@ PointResult Sweep::evaluate(const Entry& entry,
       point.errors[layer][kSmokeOnly] =
           errorFigures(seeds, r.mean(layer), r.variance(layer), *smoke);
   }
-  point.frame = std::move(frames.front());
+  if (strongest(entry)) point.frame = pictureOf(frames.front());
   return point;
 }
 
@@ -242,11 +293,12 @@ SweepResult Sweep::evaluate() const {
   result.sets = m_plan.scene.sets;
   result.width = m_facts.width;
   result.height = m_facts.height;
+  result.startMemoryBytes = m_startMemory;
   result.leftOut = m_leftOut;
   const ReferenceImage& reference = m_reference->image();
   result.reference = {m_reference->key(), m_reference->origin(),  m_reference->samplesBefore(),
                       reference.samples,  m_reference->seconds(), reference.noise(),
-                      m_targetReached};
+                      pathNoise(),        m_targetReached};
   result.referenceImage = reference.pixels;
   const auto smoke = image::smokeMask(reference.pixels);
   for (const Entry& entry : m_entries)

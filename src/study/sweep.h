@@ -57,8 +57,11 @@ class Sweep {
   void leaveOut(Entry& entry, const std::string& why);
   /// Least relMSE of a contender's first frame, [layer], over all pixels.
   std::array<double, 2> bestErrors() const;
-  bool goodEnough() const;
+
   double stillNeeded() const;
+  /// relMSE of the reference's noise as the spread of path traced frames foretells it, [layer].
+  std::array<double, 2> pathNoise() const;
+  bool strongest(const Entry& entry) const;
   PointResult evaluate(const Entry& entry,
                        const std::optional<std::vector<unsigned char>>& smoke) const;
 
@@ -69,6 +72,7 @@ class Sweep {
   std::vector<LeftOut> m_leftOut;
   std::optional<ReferenceMaker> m_reference;
   bool m_targetReached = false;
+  std::uint64_t m_startMemory = 0;
 };
 
 }  // namespace photosphere::study

@@ -70,6 +70,7 @@ Json toJson(const SweepResult& sweep) {
           {"description", sweep.description},
           {"overrides", sweep.sets},
           {"resolution", {sweep.width, sweep.height}},
+          {"start_memory_bytes", sweep.startMemoryBytes},
           {"reference",
            {{"key", r.key},
             {"continued_from", r.origin},
@@ -78,6 +79,8 @@ Json toJson(const SweepResult& sweep) {
             {"seconds", number(r.seconds)},
             {"noise_rel_mse_total", number(r.noise[kTotal])},
             {"noise_rel_mse_multiple", number(r.noise[kMultiple])},
+            {"noise_by_path_traced_frames_total", number(r.pathNoise[kTotal])},
+            {"noise_by_path_traced_frames_multiple", number(r.pathNoise[kMultiple])},
             {"noise_within_a_tenth_of_the_best", r.targetReached}}},
           {"points", std::move(points)},
           {"left_out", toJson(sweep.leftOut)}};

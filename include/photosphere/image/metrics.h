@@ -93,7 +93,8 @@ struct CompareOptions {
   const Image* secondReference = nullptr;
 };
 
-/// Compares every layer that both images have.
+/// Compares every layer that both images have. Of a depth (`Z`), pixels that are at 1e10 or beyond
+/// in both, where neither met anything, are left out.
 /// @throws ConfigError when windows do not match, or the images share no layer
 ImageComparison compareImages(const Image& image, const Image& reference,
                               const CompareOptions& options = {});

@@ -63,7 +63,7 @@ struct PointResult {
   Spread peakMemoryBytes;  ///< of a process that rendered this alone
   std::uint64_t photonsStored = 0;
   LayerFigures errors;
-  image::Image frame;  ///< of the first seed: what the report shows
+  image::Image frame;  ///< R, G, B of the first seed; of a family's most work alone
 };
 
 struct LeftOut {
@@ -77,6 +77,9 @@ struct ReferenceNote {
   std::uint64_t samplesBefore = 0, samples = 0;  ///< a pixel, as found and in all
   double seconds = 0;                            ///< spent on it in this run
   std::array<double, 2> noise{};                 ///< relMSE of its own noise, [layer], all pixels
+  /// The same from the spread of path traced contenders, whose weights do not depend on the
+  /// reference's outliers; 0 where there are none.
+  std::array<double, 2> pathNoise{};
   bool targetReached = false;  ///< noise at most a tenth of the best contender's relMSE
 };
 
@@ -86,6 +89,7 @@ struct SweepResult {
   std::string description;  ///< what is special about it
   std::vector<std::string> sets;
   int width = 0, height = 0;
+  std::uint64_t startMemoryBytes = 0;  ///< peak of a child that did nothing, before this sweep
   std::vector<PointResult> points;
   std::vector<LeftOut> leftOut;
   ReferenceNote reference;

@@ -78,7 +78,8 @@ void declareSettings(CLI::App& app, Options& options) {
   app.add_option("--frames", options.frames,
                  "The last is studied, flicker is measured over all [scene.frames]")
       ->type_name("RANGE");
-  app.add_option("--minutes", s.minutes, "Time to spend, about; what does not fit is left out [10]")
+  app.add_option("--minutes", s.minutes,
+                 "Time to spend, about; what does not fit is left out [10, quick 0.1]")
       ->check(CLI::PositiveNumber.description(""))
       ->type_name("N");
   app.add_option("--seeds", s.seeds, "Independent frames of each contender, at least 3 [5]")
