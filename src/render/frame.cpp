@@ -47,14 +47,6 @@ struct PixelSum {
   }
 };
 
-void merge(IntegratorCounters& a, const IntegratorCounters& b) {
-  a.tracking.majorantViolations += b.tracking.majorantViolations;
-  a.tracking.lookups += b.tracking.lookups;
-  a.scatterings += b.scatterings;
-  a.capped += b.capped;
-  a.cappedRadiance += b.cappedRadiance;
-}
-
 // Offset of sample s from the pixel centre: the R2 sequence (Roberts 2018), the same in every
 // pixel, so that the samples of a frame form shifted lattices.
 Vec2d sampleOffset(int s) {
@@ -79,8 +71,9 @@ class FrameLoop {
   void run() {
     const auto rows = static_cast<std::uint64_t>(m_out.height() + 2 * m_border);
     Progress progress("render", rows * static_cast<std::uint64_t>(m_options.samples));
-    for (int first = 0; first < m_options.samples; first += kSamplesAtOnce)
-      pass(first, std::min(m_options.samples, first + kSamplesAtOnce), progress);
+    const int end = m_options.firstSample + m_options.samples;
+    for (int first = m_options.firstSample; first < end; first += kSamplesAtOnce)
+      pass(first, std::min(end, first + kSamplesAtOnce), progress);
     finish();
   }
 
@@ -165,7 +158,7 @@ class FrameLoop {
 
   void report(const IntegratorCounters& counters, const Bad& bad) {
     const std::lock_guard lock(m_mutex);
-    merge(m_out.counters, counters);
+    m_out.counters.add(counters);
     m_out.nanSamples += bad.nans;
     m_out.negativeSamples += bad.negatives;
     if (bad.first.x >= 0 && m_out.firstBad.x < 0) m_out.firstBad = bad.first;

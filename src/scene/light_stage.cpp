@@ -11,23 +11,6 @@ namespace photosphere::scene {
 
 namespace {
 
-void report(const transport::TraceStatistics& traced, const estimators::LightFieldLayout& layout,
-            FrameStatistics& s) {
-  s.photonsEmitted = traced.photons;
-  s.photonsScattered = traced.scatterings;
-  // Every flight after a scattering leaves light; the first one does where lamps with extent are
-  // kept.
-  s.photonsStored = layout.unscattered ? traced.flights : traced.scatterings;
-  s.photonsCapped = traced.capped;
-  s.majorantViolations += traced.majorantViolations;
-  s.energyEmitted = traced.emitted;
-  s.energyMissed = traced.missed;
-  s.energyAbsorbed = traced.absorbed;
-  s.energyEscaped = traced.escaped;
-  s.energyCapped = traced.cappedPower;
-  s.energyError = traced.imbalance();
-}
-
 // What light in the cache came from: every lamp but its name, in local space.
 std::string lightHash(const SceneFile& scene) {
   Hasher hasher;
@@ -72,11 +55,25 @@ estimators::LightField readField(const SceneFile& scene, bool allowStale, FrameS
   setup.layout = field.layout;
   noteIdleKeys(scene, setup);
   statistics.photonsEmitted = field.photons;
+  statistics.lightMemoryBytes = field.memoryBytes();
   statistics.seconds.read += watch.seconds();
   return field;
 }
 
 }  // namespace
+
+void addTraced(const transport::TraceStatistics& traced, FrameStatistics& s) {
+  s.photonsEmitted += traced.photons;
+  s.photonsScattered += traced.scatterings;
+  s.photonsCapped += traced.capped;
+  s.majorantViolations += traced.majorantViolations;
+  s.energyEmitted += traced.emitted;
+  s.energyMissed += traced.missed;
+  s.energyAbsorbed += traced.absorbed;
+  s.energyEscaped += traced.escaped;
+  s.energyCapped += traced.cappedPower;
+  s.energyError += traced.imbalance();
+}
 
 estimators::LightField lightField(const SceneFile& scene, const RenderRequest& request,
                                   FrameSetup& setup, FrameStatistics& statistics) {
@@ -89,7 +86,11 @@ estimators::LightField lightField(const SceneFile& scene, const RenderRequest& r
   transport::TraceStatistics traced;
   estimators::LightField field = estimators::traceLightField(
       *setup.medium, setup.lights, setup.layout, setup.view, setup.particles, options, traced);
-  report(traced, setup.layout, statistics);
+  addTraced(traced, statistics);
+  // Every flight after a scattering leaves light; the first one does where lamps with extent are
+  // kept.
+  statistics.photonsStored = setup.layout.unscattered ? traced.flights : traced.scatterings;
+  statistics.lightMemoryBytes = field.memoryBytes();
   if (field.farPhotons > 0)
     setup.notes.push_back(fmt::format(
         "{} photons met no particle within the deposit radius and went to the nearest one",

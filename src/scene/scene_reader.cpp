@@ -340,6 +340,11 @@ void checkCombinations(const SceneFile& scene, const std::string& name) {
   if (!e.text("cache").empty() && e.text("type") != "photosphere")
     throw ConfigError(
         fmt::format("{}: 'cache' needs type = \"photosphere\", not \"{}\"", place, e.text("type")));
+  if (e.text("type") == "photosphere" && e.text("kernel") != "none")
+    throw ConfigError(
+        fmt::format("{}: kernel = \"{}\" is not served by this version yet for type = "
+                    "\"photosphere\", only for \"photon_map\"",
+                    place, e.text("kernel")));
   if (!e.text("cache").empty() && e.text("basis") == "view")
     throw ConfigError(place +
                       ": basis = \"view\" holds light for one camera and is never cached; leave "

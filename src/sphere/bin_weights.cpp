@@ -22,24 +22,27 @@ int latticeFor(double width) {
 
 }  // namespace
 
-BinWeights::BinWeights(const Partition& partition, const Phase& phase, double meanCosine,
+BinWeights::BinWeights(const BinShares& deposit, const Phase& phase, double meanCosine,
                        Reconstruction reconstruction)
-    : m_partition(partition) {
-  if (reconstruction == Reconstruction::constant || size() > kMaxSmoothBins) {
-    tabulate(partition, phase, meanCosine);
+    : m_partition(deposit.partition()) {
+  const bool even =
+      deposit.deposit() == DirectionDeposit::nearest && reconstruction == Reconstruction::constant;
+  if (even || size() > kMaxSmoothBins) {
+    tabulate(m_partition, phase, meanCosine);
     return;
   }
-  const Partition fine(partition.rows() * (partition.rows() <= 2 ? 3 : 2));
+  const int rows = m_partition.rows();
+  const Partition fine(rows * (rows <= 2 ? 3 : 2));
   tabulate(fine, phase, meanCosine);
-  reduce(fine);
+  reduce(reconstruction == Reconstruction::smooth ? smoothReconstruction(deposit, fine)
+                                                  : depositReconstruction(deposit, fine),
+         static_cast<std::size_t>(fine.size()));
 }
 
 // Weights of fine cells become weights of bins: light in a bin is spread over the fine cells around
 // it.
-void BinWeights::reduce(const Partition& fine) {
+void BinWeights::reduce(const std::vector<double>& spread, std::size_t cells) {
   const auto bins = static_cast<std::size_t>(size());
-  const auto cells = static_cast<std::size_t>(fine.size());
-  const std::vector<double> spread = smoothReconstruction(m_partition, fine);
   const std::size_t nodes = m_table.size() / cells;
   std::vector<float> reduced(nodes * bins);
   parallelFor(nodes, 8, [&](std::size_t begin, std::size_t end) {

@@ -13,31 +13,71 @@ using Matrix = std::vector<double>;
 constexpr double kWidth = 0.6;
 constexpr int kSide = 4;  // points along a side of a cell for its mean
 
-// Adds the basis functions' values at a direction, times `weight`, to a row.
-void addBasis(const Partition& bins, const Vec3f& w, double weight, double* row) {
-  const auto count = static_cast<std::size_t>(bins.size());
-  const double spacing2 = 4 * kPi / static_cast<double>(count);
-  std::vector<double> values(count);
+// Writes the basis functions' values at a direction.
+void basisAt(const Partition& bins, const Vec3f& w, std::vector<double>& values) {
+  const double spacing2 = 4 * kPi / static_cast<double>(values.size());
   double sum = 0;
-  for (std::size_t j = 0; j < count; ++j) {
+  for (std::size_t j = 0; j < values.size(); ++j) {
     const Vec3d d = Vec3d(w) - Vec3d(bins.center(static_cast<int>(j)));
     values[j] = std::exp(-0.5 * glm::dot(d, d) / (kWidth * kWidth * spacing2));
     sum += values[j];
   }
-  for (std::size_t j = 0; j < count; ++j)
-    row[j] += weight * values[j] / sum;
+  for (double& v : values)
+    v /= sum;
+}
+
+// Calls visit(cell, direction) for points that stand for equal areas of every cell.
+template <class Visit>
+void forEachPoint(const Partition& cells, const Visit& visit) {
+  for (int cell = 0; cell < cells.size(); ++cell)
+    for (int y = 0; y < kSide; ++y)
+      for (int x = 0; x < kSide; ++x)
+        visit(static_cast<std::size_t>(cell),
+              cells.point(cell, Vec2d(x + 0.5, y + 0.5) / static_cast<double>(kSide)));
 }
 
 // Mean of every basis function over every cell, [cell][bin].
 Matrix cellMeans(const Partition& bins, const Partition& cells) {
   const auto columns = static_cast<std::size_t>(bins.size());
   Matrix means(static_cast<std::size_t>(cells.size()) * columns, 0.0);
-  for (int cell = 0; cell < cells.size(); ++cell)
-    for (int y = 0; y < kSide; ++y)
-      for (int x = 0; x < kSide; ++x)
-        addBasis(bins, cells.point(cell, Vec2d(x + 0.5, y + 0.5) / static_cast<double>(kSide)),
-                 1.0 / (kSide * kSide), &means[static_cast<std::size_t>(cell) * columns]);
+  std::vector<double> values(columns);
+  forEachPoint(cells, [&](std::size_t cell, const Vec3f& w) {
+    basisAt(bins, w, values);
+    for (std::size_t j = 0; j < columns; ++j)
+      means[cell * columns + j] += values[j] / (kSide * kSide);
+  });
   return means;
+}
+
+// What each bin is given of each basis function's light, [bin][basis], over the area of a bin.
+Matrix depositedMeans(const BinShares& deposit) {
+  const Partition& bins = deposit.partition();
+  const auto columns = static_cast<std::size_t>(bins.size());
+  Matrix means(columns * columns, 0.0);
+  std::vector<double> values(columns);
+  std::vector<BinShare> shares(static_cast<std::size_t>(deposit.maxShares()));
+  forEachPoint(bins, [&](std::size_t, const Vec3f& w) {
+    basisAt(bins, w, values);
+    const int count = deposit.shares(w, shares.data());
+    for (int i = 0; i < count; ++i) {
+      const BinShare& share = shares[static_cast<std::size_t>(i)];
+      double* row = &means[static_cast<std::size_t>(share.bin) * columns];
+      for (std::size_t j = 0; j < columns; ++j)
+        row[j] += static_cast<double>(share.weight) * values[j] / (kSide * kSide);
+    }
+  });
+  return means;
+}
+
+// Scales every column to the sum 1.
+void normaliseColumns(Matrix& m, std::size_t n) {
+  for (std::size_t j = 0; j < n; ++j) {
+    double sum = 0;
+    for (std::size_t i = j; i < m.size(); i += n)
+      sum += m[i];
+    for (std::size_t i = j; i < m.size(); i += n)
+      m[i] /= sum;
+  }
 }
 
 Matrix multiply(const Matrix& a, const Matrix& b, std::size_t n) {
@@ -53,9 +93,10 @@ Matrix multiply(const Matrix& a, const Matrix& b, std::size_t n) {
 
 }  // namespace
 
-std::vector<double> smoothReconstruction(const Partition& bins, const Partition& fine) {
+std::vector<double> smoothReconstruction(const BinShares& deposit, const Partition& fine) {
+  const Partition& bins = deposit.partition();
   const auto n = static_cast<std::size_t>(bins.size());
-  Matrix residual = cellMeans(bins, bins);  // I - A
+  Matrix residual = depositedMeans(deposit);  // I - A
   for (std::size_t i = 0; i < n; ++i)
     for (std::size_t j = 0; j < n; ++j)
       residual[i * n + j] = (i == j ? 1.0 : 0.0) - residual[i * n + j];
@@ -66,13 +107,22 @@ std::vector<double> smoothReconstruction(const Partition& bins, const Partition&
     once[i * n + i] += 1.0;
   }
   Matrix spread = multiply(cellMeans(bins, fine), multiply(once, square, n), n);
-  for (std::size_t j = 0; j < n; ++j) {
-    double sum = 0;
-    for (std::size_t i = j; i < spread.size(); i += n)
-      sum += spread[i];
-    for (std::size_t i = j; i < spread.size(); i += n)
-      spread[i] /= sum;
-  }
+  normaliseColumns(spread, n);
+  return spread;
+}
+
+std::vector<double> depositReconstruction(const BinShares& deposit, const Partition& fine) {
+  const auto n = static_cast<std::size_t>(deposit.partition().size());
+  Matrix spread(static_cast<std::size_t>(fine.size()) * n, 0.0);
+  std::vector<BinShare> shares(static_cast<std::size_t>(deposit.maxShares()));
+  forEachPoint(fine, [&](std::size_t cell, const Vec3f& w) {
+    const int count = deposit.shares(w, shares.data());
+    for (int i = 0; i < count; ++i) {
+      const BinShare& share = shares[static_cast<std::size_t>(i)];
+      spread[cell * n + static_cast<std::size_t>(share.bin)] += static_cast<double>(share.weight);
+    }
+  });
+  normaliseColumns(spread, n);
   return spread;
 }
 

@@ -6,24 +6,27 @@
 #include <vector>
 
 #include "photosphere/core/types.h"
+#include "photosphere/sphere/bin_shares.h"
 #include "photosphere/sphere/partition.h"
 
 namespace photosphere::sphere {
 
 /// How the light inside a bin is thought to be spread.
 enum class Reconstruction {
-  constant,  ///< evenly over the cell: the phase function is averaged over the bin
-  smooth,    ///< as a smooth function over the sphere whose bin means are the histogram's: removes
-             ///< most of the error that wide bins make where phase and light peak together; weights
-             ///< may be slightly negative. Above 512 bins the same as `constant`, which is as good
-             ///< there
+  constant,  ///< as it was collected: evenly over the cell for `nearest`, so that the phase
+             ///< function is averaged over the bin, by its share elsewhere
+  smooth,  ///< as a smooth function over the sphere that would leave this histogram: removes
+           ///< most of the error that wide bins make where phase and light peak together; weights
+           ///< may be slightly negative. Above 512 bins light is taken as even over every cell,
+           ///< which is as good there
 };
 
-/// Table of W_j(wo) = (1/A) * integral over cell j of f(w, wo) dw [1/sr], the phase function
-/// averaged over bin j, for every outgoing direction wo. The partition looks the same from every
-/// octant, so only first-octant wo are tabulated, on a triangular lattice whose spacing follows the
-/// width of the lobe; between its nodes W_j is linear. Every node is scaled to sum_j A W_j = 1
-/// (quadrature leaves below 1e-4), which linear interpolation keeps. Immutable; thread-safe.
+/// Table of W_j(wo) = integral of f(w, wo) b_j(w) dw [1/sr], the phase function averaged over the
+/// light of bin j (b_j, of unit integral), for every outgoing direction wo. The partition looks the
+/// same from every octant, so only first-octant wo are tabulated, on a triangular lattice whose
+/// spacing follows the width of the lobe; between its nodes W_j is linear. Every node is scaled to
+/// sum_j A W_j = 1 (quadrature leaves below 1e-4), which linear interpolation keeps. Immutable;
+/// thread-safe.
 class BinWeights {
  public:
   /// Phase function [1/sr] of unit propagation directions. It must depend on the angle between them
@@ -33,8 +36,12 @@ class BinWeights {
   /// @param meanCosine  g of the lobe: 1 - |g| sets the resolution of the quadrature and lattice,
   /// its
   ///                    sign the side of the peak. Finer than |g| = 0.995 is treated as that.
-  BinWeights(const Partition& partition, const Phase& phase, double meanCosine,
+  BinWeights(const BinShares& deposit, const Phase& phase, double meanCosine,
              Reconstruction reconstruction = Reconstruction::constant);
+  /// The same for `nearest` deposit.
+  BinWeights(const Partition& partition, const Phase& phase, double meanCosine,
+             Reconstruction reconstruction = Reconstruction::constant)
+      : BinWeights(BinShares(partition), phase, meanCosine, reconstruction) {}
 
   int size() const { return m_partition.size(); }
   /// Writes size() weights [1/sr] for a unit propagation direction toward the eye. The zero vector
@@ -45,7 +52,7 @@ class BinWeights {
 
  private:
   void tabulate(const Partition& cells, const Phase& phase, double meanCosine);
-  void reduce(const Partition& fine);
+  void reduce(const std::vector<double>& spread, std::size_t cells);
   const float* node(int i, int j) const;
 
   Partition m_partition;
