@@ -130,7 +130,8 @@ std::string factsWork(const scene::SceneFile& scene, std::int64_t frame) {
   json facts{{"medium", setup.medium->hash()},
              {"width", size.x},
              {"height", size.y},
-             {"multiple", setup.effects.multipleScattering}};
+             {"multiple", setup.effects.multipleScattering},
+             {"light_bytes", scene::predictedLightBytes(setup)}};
   if (!b.empty()) facts["bounds"] = {b.min.x, b.min.y, b.min.z, b.max.x, b.max.y, b.max.z};
   return facts.dump();
 }
@@ -200,6 +201,7 @@ SceneFacts sceneFacts(const scene::SceneFile& scene, std::int64_t frame) {
   facts.width = values.at("width");
   facts.height = values.at("height");
   facts.multipleScattering = values.at("multiple");
+  facts.lightBytes = values.at("light_bytes");
   if (values.contains("bounds")) {
     const auto b = values.at("bounds").get<std::vector<double>>();
     facts.bounds.grow(Vec3d(b[0], b[1], b[2]));

@@ -54,6 +54,7 @@ struct SceneFacts {
   int width = 0, height = 0;
   Box3d bounds;  ///< of the smoke, world space; empty without smoke
   bool multipleScattering = false;
+  std::uint64_t lightBytes = 0;  ///< forecast for its stored light
 };
 /// Sets the scene up in a child. @throws the child's failure as Error
 SceneFacts sceneFacts(const scene::SceneFile& scene, std::int64_t frame);

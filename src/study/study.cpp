@@ -1,16 +1,15 @@
 #include "photosphere/study/study.h"
 
 #include <fmt/format.h>
-#include <sys/utsname.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 
 #include "child.h"
 #include "flicker.h"
 #include "hard_cases.h"
+#include "machine.h"
 #include "particle_cache.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/log.h"
@@ -33,43 +32,10 @@ constexpr int kHardEdge = 128;
 // Parts of the time, of what is left when each begins.
 constexpr double kMeasureShare = 0.35, kReferenceShare = 0.45, kHardShare = 0.6;
 
-std::string machineName() {
-  std::ifstream info("/proc/cpuinfo");
-  std::string line, model = "unknown processor";
-  while (std::getline(info, line))
-    if (line.rfind("model name", 0) == 0 && line.find(':') != std::string::npos) {
-      model = line.substr(line.find(':') + 2);
-      break;
-    }
-  utsname system = {};
-  uname(&system);
-  return fmt::format("{}, {} {}", model, system.sysname, system.release);
-}
-
 Vec2i resolutionOf(const scene::SceneFile& scene) {
   const Vec2d size = scene.camera.vec2("resolution");
   return {static_cast<int>(size.x), static_cast<int>(size.y)};
 }
-
-// Removes what contenders left, however the study ends.
-class RunFolder {
- public:
-  explicit RunFolder(fs::path path) : m_path(std::move(path)) {
-    std::error_code error;
-    fs::create_directories(m_path, error);
-    if (error) throw OutputError(m_path.string(), "cannot create this folder: " + error.message());
-  }
-  ~RunFolder() {
-    std::error_code ignored;
-    fs::remove_all(m_path, ignored);
-  }
-  RunFolder(const RunFolder&) = delete;
-  RunFolder& operator=(const RunFolder&) = delete;
-  const fs::path& path() const { return m_path; }
-
- private:
-  fs::path m_path;
-};
 
 class Study {
  public:

@@ -12,6 +12,7 @@
 #include "photosphere/core/frames.h"
 #include "photosphere/core/log.h"
 #include "photosphere/core/parallel.h"
+#include "photosphere/study/paper.h"
 #include "photosphere/study/study.h"
 #include "print.h"
 
@@ -22,10 +23,14 @@ namespace {
 struct Options {
   study::StudyOptions study;
   std::string scene, output, cache, resolution, frames;
-  bool noHardCases = false, noFlicker = false;
+  bool noHardCases = false, noFlicker = false, paper = false;
 };
 
 void complete(Options& options) {
+  if (options.paper != options.scene.empty())
+    throw ConfigError(options.paper
+                          ? "--paper has scenes of its own; leave SCENE out"
+                          : "SCENE is required; or give --paper for the paper's exhibits");
   study::StudyOptions& s = options.study;
   s.scene = options.scene;
   s.output = options.output;
@@ -44,27 +49,40 @@ void complete(Options& options) {
   s.sets.push_back(fmt::format("camera.resolution=[{}, {}]", size[0], size[1]));
 }
 
-int runStudy(Options& options) {
-  complete(options);
-  const study::StudyOptions& s = options.study;
+int runPaper(const study::StudyOptions& s) {
+  for (const char* file : {"paper.csv", "paper.json", "index.html"})
+    checkWritable((s.output / file).string());
+  const study::PaperResult result = study::runPaper(s);
+  study::writePaperReport(result, s);
+  printLine("{}: {} exhibits, {:.1f} s", (s.output / "index.html").string(), result.exhibits.size(),
+            result.elapsedSeconds);
+  return static_cast<int>(ExitCode::ok);
+}
+
+int runSweeps(const study::StudyOptions& s) {
   // Before the work, not after it.
   study::gnuplotVersion();
   for (const char* file : {"study.csv", "study.json", "index.html"})
     checkWritable((s.output / file).string());
+  const study::StudyResult result = study::runStudy(s);
+  study::writeReport(result, s);
+  std::size_t points = 0;
+  for (const study::SweepResult& sweep : result.sweeps)
+    points += sweep.points.size();
+  printLine("{}: {} points in {} sweeps, {:.1f} s", (s.output / "index.html").string(), points,
+            result.sweeps.size(), result.elapsedSeconds);
+  return static_cast<int>(ExitCode::ok);
+}
+
+int runStudy(Options& options) {
+  complete(options);
   try {
-    const study::StudyResult result = study::runStudy(s);
-    study::writeReport(result, s);
-    std::size_t points = 0;
-    for (const study::SweepResult& sweep : result.sweeps)
-      points += sweep.points.size();
-    printLine("{}: {} points in {} sweeps, {:.1f} s", (s.output / "index.html").string(), points,
-              result.sweeps.size(), result.elapsedSeconds);
+    return options.paper ? runPaper(options.study) : runSweeps(options.study);
   } catch (const InterruptedError& stopped) {
     log::error("{}; references so far are kept: run the same command again to go on",
                stopped.what());
     return static_cast<int>(ExitCode::interruptedResumable);
   }
-  return static_cast<int>(ExitCode::ok);
 }
 
 void declareSettings(CLI::App& app, Options& options) {
@@ -100,8 +118,9 @@ void declareSettings(CLI::App& app, Options& options) {
 std::function<int()> declareStudy(CLI::App& app) {
   auto options = std::make_shared<Options>();
   app.add_option("SCENE", options->scene, "Scene (.toml), or a cache for which one is made up")
-      ->type_name("FILE")
-      ->required();
+      ->type_name("FILE");
+  app.add_flag("--paper", options->paper,
+               "The exhibits of Min & Ihm 2010 on the shipped smoke, in place of a scene");
   app.add_option("-o,--output", options->output, "Folder of index.html, study.csv and study.json")
       ->type_name("DIR")
       ->required();
