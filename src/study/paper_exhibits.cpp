@@ -34,14 +34,17 @@ PaperFrame column(std::string label, double g, Sets sets, double paperValue = 0)
 }
 
 ExhibitPlan tableOne(std::int64_t photons) {
-  ExhibitPlan plan{"Table 1", "Seconds of rendering by search radius, g = 0.4, Gaussian smoothing",
+  ExhibitPlan plan{"Table 1",
+                   "Seconds of rendering by search radius, g = 0.4, Gaussian smoothing",
                    "On an Athlon 64 3500+: the photon map is faster than the photosphere with 32 "
                    "directions at every radius, and than that with 8 at all but the largest.",
                    "The paper gives neither its photon count, nor the scale of its radii, nor the "
                    "size of its picture; ours are scene units of the column (4 across). Our photon "
                    "map weighs every photon's phase at once, and our kernels are normalised on the "
                    "sphere (its eq. 8 is not). Ratios say more than seconds.",
-                   "s"};
+                   "s",
+                   false,
+                   {}};
   const double radii[] = {0.4, 0.3, 0.2};
   const double map[] = {618.2, 353.9, 186.3}, eight[] = {539.4, 375.3, 223.8},
                thirtyTwo[] = {835.5, 572.6, 321.8};

@@ -53,9 +53,10 @@ TEST(Reference, varianceIsTheErrorOfTheMean) {
               static_cast<std::uint64_t>(samples));
     }
     ASSERT_EQ(reference.samples, 32u);
-    for (const float v : reference.mean(kMultiple)[0])
+    const Planes mean = reference.mean(kMultiple), spread = reference.variance(kMultiple);
+    for (const float v : mean[0])
       error += (v - 1.0) * (v - 1.0) / (64 * kTrials);
-    for (const float v : reference.variance(kMultiple)[0])
+    for (const float v : spread[0])
       variance += v / (64.0 * kTrials);
   }
   const double exact = 4.0 / 12 / 32;

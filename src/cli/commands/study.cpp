@@ -49,7 +49,7 @@ void complete(Options& options) {
   s.sets.push_back(fmt::format("camera.resolution=[{}, {}]", size[0], size[1]));
 }
 
-int runPaper(const study::StudyOptions& s) {
+int reportPaper(const study::StudyOptions& s) {
   for (const char* file : {"paper.csv", "paper.json", "index.html"})
     checkWritable((s.output / file).string());
   const study::PaperResult result = study::runPaper(s);
@@ -59,7 +59,7 @@ int runPaper(const study::StudyOptions& s) {
   return static_cast<int>(ExitCode::ok);
 }
 
-int runSweeps(const study::StudyOptions& s) {
+int reportSweeps(const study::StudyOptions& s) {
   // Before the work, not after it.
   study::gnuplotVersion();
   for (const char* file : {"study.csv", "study.json", "index.html"})
@@ -77,7 +77,7 @@ int runSweeps(const study::StudyOptions& s) {
 int runStudy(Options& options) {
   complete(options);
   try {
-    return options.paper ? runPaper(options.study) : runSweeps(options.study);
+    return options.paper ? reportPaper(options.study) : reportSweeps(options.study);
   } catch (const InterruptedError& stopped) {
     log::error("{}; references so far are kept: run the same command again to go on",
                stopped.what());
