@@ -103,7 +103,7 @@ Contender contender(const Family& family, int level, std::int64_t work) {
     c.label += fmt::format(", {} photons", formatCount(work));
   } else if (family.work == Work::samples) {
     c.sets.push_back(fmt::format("estimator.samples={}", work));
-    c.label += fmt::format(", {} samples", work);
+    c.label += fmt::format(", {} samples a pixel", work);
   }
   return c;
 }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "gnuplot.h"
 #include "html.h"
@@ -53,6 +54,16 @@ std::string errorRange(const std::vector<Curve>& curves) {
   return fmt::format("set yrange [{:.9g}:{:.9g}]\n", low / 2, high * 1.3);
 }
 
+// Labels at 1, 2 and 5 of each decade: a narrow range would else show one of them or none.
+std::string labels(const char* axis) {
+  std::string text = fmt::format("set {}tics (", axis);
+  for (int decade = -7; decade <= 6; ++decade)
+    for (const int digit : {1, 2, 5})
+      text += fmt::format("{}'{:g}' {}e{}", decade == -7 && digit == 1 ? "" : ", ",
+                          digit * std::pow(10.0, decade), digit, decade);
+  return text + ")\n";
+}
+
 std::string frontBlock(const std::vector<Curve>& curves) {
   std::vector<std::pair<double, double>> front;
   for (const Curve& curve : curves)
@@ -77,11 +88,11 @@ std::string errorPlotScript(const std::vector<Curve>& curves, const std::string&
       "set title '{}' noenhanced\nset logscale xy\nset format '%g'\n"
       "set xlabel 'time of a frame [s], median and range of the seeds'\n"
       "set ylabel 'relative error, root of relMSE [1], 95 % interval'\n"
-      "set grid xtics ytics mxtics mytics lc '#cccccc' lw 0.5, lc '#e8e8e8' lw 0.5\n"
+      "set grid xtics ytics lc '#d8d8d8' lw 0.5\n"
       "set key outside right top Left reverse noenhanced\nset border lw 1\nset offsets graph 0.05, "
       "graph 0.05, 0, 0\n",
       width, height, gnuplotText(title));
-  text += errorRange(curves);
+  text += errorRange(curves) + labels("x") + labels("y");
   text += "plot $front using 1:2 with lines lc '#b0b0b0' lw 5 title 'Pareto front (ringed)', \\\n";
   for (std::size_t i = 0; i < curves.size(); ++i) {
     const Look& look = kLooks[i % kLooks.size()];
