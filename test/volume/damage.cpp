@@ -49,7 +49,7 @@ void readDamaged(const fs::path& path, const std::string& what, Outcome& outcome
   ASSERT_GE(child, 0);
   if (child == 0) {
     const struct rlimit memory { rlim_t(1) << 30, rlim_t(1) << 30 }, cpu{10, 12}, core{0, 0};
-    setrlimit(RLIMIT_AS, &memory);
+    if (!test::kSanitized) setrlimit(RLIMIT_AS, &memory);  // a sanitizer reserves terabytes
     setrlimit(RLIMIT_CPU, &cpu);
     setrlimit(RLIMIT_CORE, &core);
     close(STDERR_FILENO);
