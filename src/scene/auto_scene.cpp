@@ -110,8 +110,9 @@ std::vector<double> axisDepths(const transport::Medium& medium) {
     for (int i = 0; i < kRays * kRays; ++i) {
       Vec3d from = box.min;
       const int a = (axis + 1) % 3, b = (axis + 2) % 3;
-      from[a] += (i % kRays + 0.5) / kRays * box.extent()[a];
-      from[b] += (i / kRays + 0.5) / kRays * box.extent()[b];
+      const int column = i % kRays, row = i / kRays;
+      from[a] += (column + 0.5) / kRays * box.extent()[a];
+      from[b] += (row + 0.5) / kRays * box.extent()[b];
       Vec3f d(0.0f);
       d[axis] = 1.0f;
       const double depth = static_cast<double>(transport::marchOpticalDepth(
