@@ -73,6 +73,7 @@ std::string describeEstimators() {
 std::string describeScene() {
   return describeRows("[scene]", scene::sceneParams()) +
          describeRows("[[volume]]", scene::volumeParams()) +
+         describeRows("emission of a [[volume]]", scene::emissionParams()) +
          describeRows("[effects]", scene::effectsParams()) +
          describeRows("[render]", scene::renderParams()) +
          describeRows("[output]", scene::outputParams());

@@ -33,10 +33,11 @@ class CarrierSums {
               const LightFieldLayout& layout, const View& view, RandomKey key, FixedSums& sums);
 
   const DirectionalBasis& basis() const { return m_basis; }
-  /// The set a flight belongs to: 0 = light scattered before, 1 = light as its lamp sent it. -1 =
-  /// none: the lamp's own light is evaluated at march time.
+  /// The set a flight belongs to: 0 = light scattered before or emitted by the smoke, which no
+  /// other term carries to its next scattering; 1 = light as its lamp sent it. -1 = none: the
+  /// lamp's own light is evaluated at march time.
   int setOf(const transport::Flight& flight) const {
-    if (flight.scatterings > 0) return 0;
+    if (flight.scatterings > 0 || flight.light == transport::kEmittedBySmoke) return 0;
     return m_wantsUnscattered[flight.light] ? 1 : -1;
   }
   /// Adds `amount` (of the quantum's unit, by channel) that arrives at `p` to one carrier.

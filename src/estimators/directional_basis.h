@@ -10,10 +10,12 @@
 //   B::kKeepsMeans                    values are bins, which also keep their mean direction
 // `value` counts groups of `channels` floats within a set. For `kKeepsMeans` see LightFieldLayout.
 
+#include <array>
 #include <variant>
 #include <vector>
 
 #include "photosphere/estimators/light_field.h"
+#include "photosphere/sphere/spherical_harmonics.h"
 
 namespace photosphere::estimators {
 
@@ -62,6 +64,24 @@ struct WithMeans : Bins {
   static constexpr bool kKeepsMeans = true;
 };
 
+/// Spherical harmonics: light times each of them.
+struct Harmonics {
+  static constexpr bool kSigned = true, kKeepsMeans = false;
+  struct Along {
+    std::array<float, sphere::SphericalHarmonics::kMaxCount> values;
+  };
+  void begin(const transport::Flight& flight, Along& along) const {
+    harmonics.evaluate(flight.direction, along.values.data());
+  }
+  template <class Visit>
+  void at(const transport::Flight&, const Along& along, const Vec3f&, const Visit& visit) const {
+    for (int i = 0; i < harmonics.count(); ++i)
+      visit(i, along.values[static_cast<std::size_t>(i)]);
+  }
+
+  sphere::SphericalHarmonics harmonics;
+};
+
 /// The view basis: one value for each phase function, times that function toward the eye.
 struct TowardEye {
   static constexpr bool kSigned = false, kKeepsMeans = false;
@@ -80,13 +100,15 @@ struct TowardEye {
   int count;  ///< of phase functions
 };
 
-using DirectionalBasis =
-    std::variant<NearestBin, SharedBins, WithMeans<NearestBin>, WithMeans<SharedBins>, TowardEye>;
+using DirectionalBasis = std::variant<NearestBin, SharedBins, WithMeans<NearestBin>,
+                                      WithMeans<SharedBins>, Harmonics, TowardEye>;
 
 /// The basis that a layout asks for. `medium` must outlive it.
 inline DirectionalBasis directionalBasis(const LightFieldLayout& layout,
                                          const transport::Medium& medium, const View& view) {
   if (layout.basis == Basis::view) return TowardEye{&medium, view, layout.phases};
+  if (layout.basis == Basis::sphericalHarmonics)
+    return Harmonics{sphere::SphericalHarmonics(layout.order)};
   const bool nearest = layout.direction == sphere::DirectionDeposit::nearest;
   const NearestBin one{sphere::Partition(layout.rows)};
   if (layout.keepsMeans()) {

@@ -38,15 +38,21 @@ void checkLayout(const LightFieldLayout& l) {
          "carriers hold no energy to share out");
   refuse(l.merge == Merge::sampled && !particles,
          "merge = \"sampled\" draws one bin of each particle: it needs carrier = \"particles\"");
+  if (l.basis == Basis::view) {
+    refuse(l.evaluate != Evaluate::perView,
+           "evaluate = \"per_step\" reads directions at every step, and basis = \"view\" keeps "
+           "none: choose \"histogram\" or \"spherical_harmonics\"");
+    refuse(smooths,
+           "'kernel' smooths directions, and basis = \"view\" keeps none: choose \"histogram\" or "
+           "\"spherical_harmonics\"");
+  }
   if (l.basis != Basis::histogram) {
     refuse(l.direction != sphere::DirectionDeposit::nearest,
            "'direction' chooses bins: it needs basis = \"histogram\"");
     refuse(l.representative != Representative::bin,
            "'representative' is a bin's direction: it needs basis = \"histogram\"");
     refuse(l.merge != Merge::full, "'merge' joins bins: it needs basis = \"histogram\"");
-    refuse(l.evaluate != Evaluate::perView,
-           "evaluate = \"per_step\" reads bins at every step: it needs basis = \"histogram\"");
-    refuse(smooths, "'kernel' smooths bins: it needs basis = \"histogram\"");
+    if (smooths) l.smoothing();
     return;
   }
   refuse(

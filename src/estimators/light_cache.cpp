@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 
 #include <charconv>
+#include <cmath>
 #include <map>
 
 #include "photosphere/core/error.h"
 #include "photosphere/core/version.h"
+#include "photosphere/sphere/spherical_harmonics.h"
 #include "photosphere/volume/vdb_file.h"
 
 namespace photosphere::estimators {
@@ -26,6 +28,9 @@ struct Named {
 };
 constexpr Named<Carrier> kCarriers[] = {{Carrier::voxels, "voxels"},
                                         {Carrier::particles, "particles"}};
+// The view basis belongs to one camera and has no cache.
+constexpr Named<Basis> kBases[] = {{Basis::histogram, "histogram"},
+                                   {Basis::sphericalHarmonics, "spherical_harmonics"}};
 constexpr Named<Deposit> kDeposits[] = {{Deposit::trackLength, "track_length"},
                                         {Deposit::collision, "collision"}};
 constexpr Named<EnergyRule> kEnergies[] = {{EnergyRule::gather, "gather"},
@@ -120,7 +125,8 @@ Metadata describe(const LightField& field, const LightCacheKey& key) {
   m["photosphere_version"] = versionText();
   m["quantity"] = l.holdsPower() ? "power [W]" : "fluence rate [W m^-2]";
   m["carrier"] = nameOf(kCarriers, l.carrier);
-  m["basis"] = "histogram";
+  m["basis"] = nameOf(kBases, l.basis);
+  if (l.basis == Basis::sphericalHarmonics) m["order"] = std::to_string(l.order);
   m["deposit"] = nameOf(kDeposits, l.deposit);
   m["energy"] = nameOf(kEnergies, l.energy);
   m["spatial_kernel"] = nameOf(kKernels, l.kernel);
@@ -153,6 +159,11 @@ Metadata describe(const LightField& field, const LightCacheKey& key) {
   return m;
 }
 
+// Attribute of the values themselves.
+std::string valuesName(const LightFieldLayout& layout) {
+  return layout.basis == Basis::histogram ? "photon_histogram" : "photon_harmonics";
+}
+
 // One set of values as strided attributes: bins, their sum, and mean directions where they are
 // kept.
 void addSet(volume::ParticleSet& points, const LightField& field, std::size_t set,
@@ -172,13 +183,15 @@ void addSet(volume::ParticleSet& points, const LightField& field, std::size_t se
     directions.insert(directions.end(), values + light, values + size);
     for (std::size_t c = 0; c < channels; ++c) {
       double sum = 0;
-      for (std::size_t j = c; j < light; j += channels)
-        sum += static_cast<double>(values[j]);
+      if (l.basis == Basis::histogram)
+        for (std::size_t j = c; j < light; j += channels)
+          sum += static_cast<double>(values[j]);
+      else  // the first harmonic is 1 / sqrt(4 pi) everywhere
+        sum = std::sqrt(4 * kPi) * static_cast<double>(values[c]);
       energy.push_back(static_cast<float>(sum));
     }
   }
-  points.add(
-      {fmt::format("photon_histogram{}", suffix), static_cast<int>(light), std::move(histogram)});
+  points.add({valuesName(l) + suffix, static_cast<int>(light), std::move(histogram)});
   points.add({fmt::format("photon_energy{}", suffix), l.channels, std::move(energy)});
   if (l.keepsMeans())
     points.add({fmt::format("photon_direction{}", suffix), 3 * l.bins(), std::move(directions)});
@@ -198,10 +211,10 @@ const std::vector<float>& floats(const volume::ParticleSet& points, const std::s
 
 void writeLightCache(const std::filesystem::path& path, const LightField& field,
                      const LightCacheKey& key) {
-  if (field.layout.basis != Basis::histogram)
+  if (field.layout.basis == Basis::view)
     throw ConfigError(
-        "a light cache holds a histogram: the view basis belongs to one camera; set "
-        "estimator.basis = \"histogram\" or \"auto\"");
+        "a light cache serves every camera, and the view basis belongs to one; set "
+        "estimator.basis = \"histogram\", \"spherical_harmonics\" or \"auto\"");
   volume::ParticleSet points;
   const bool voxels = field.layout.carrier == Carrier::voxels;
   points.positions.reserve(field.carriers());
@@ -252,7 +265,9 @@ LightField readLightCache(const std::filesystem::path& path, const LightCacheKey
   LightField field;
   LightFieldLayout& l = field.layout;
   l.carrier = m.choice("carrier", kCarriers);
-  l.basis = Basis::histogram;
+  l.basis = m.choice("basis", kBases);
+  if (l.basis == Basis::sphericalHarmonics)
+    l.order = m.whole("order", 0, sphere::SphericalHarmonics::kMaxOrder);
   l.deposit = m.choice("deposit", kDeposits);
   l.energy = m.choice("energy", kEnergies);
   l.kernel = m.choice("spatial_kernel", kKernels);
@@ -306,7 +321,7 @@ LightField readLightCache(const std::filesystem::path& path, const LightCacheKey
   };
   for (std::size_t set = 0; set < (l.unscattered ? 2u : 1u); ++set) {
     const std::string suffix = set ? "_unscattered" : "";
-    place("photon_histogram" + suffix, light, set * size);
+    place(valuesName(l) + suffix, light, set * size);
     if (l.keepsMeans()) place("photon_direction" + suffix, size - light, set * size + light);
   }
   if (l.carrier == Carrier::particles) {

@@ -59,6 +59,7 @@ class PerStep : public InscatterSource {
       m_readers.emplace_back(m_field.layout, medium, static_cast<int>(k));
   }
   bool carriesUnscattered() const override { return m_sets == 2; }
+  double clampedShare() const override { return m_clampedShare; }
 
  protected:
   using Towards = std::vector<PhaseReader::Toward>;
@@ -85,12 +86,33 @@ class PerStep : public InscatterSource {
     (set == 0 ? result.multiple : result.single) += sigma * glm::max(light, Rgb(0.0f));
   }
 
+  // What reading clamps, measured on some carriers toward eight directions.
+  void measureClamped() {
+    const std::size_t stride = m_field.carriers() / 2048 + 1;
+    const sphere::Partition octants(1);
+    double below = 0, light = 0;
+    PhaseReader::Toward toward;
+    for (int k = 0; k < octants.size(); ++k)
+      for (const PhaseReader& reader : m_readers) {
+        reader.turn(octants.center(k), toward);
+        for (std::size_t i = 0; i < m_field.carriers(); i += stride)
+          for (std::size_t s = 0; s < m_sets; ++s) {
+            const Rgb read = reader.read(set(i, s), toward);
+            const Rgb clamped = glm::max(read, Rgb(0.0f));
+            light += static_cast<double>(meanComponent(clamped));
+            below += static_cast<double>(meanComponent(clamped - read));
+          }
+      }
+    m_clampedShare = light > 0 ? below / light : 0.0;
+  }
+
   LightField m_field;
   std::size_t m_stride, m_setSize, m_sets;
   std::vector<PhaseReader> m_readers;
 
  private:
   std::uint64_t m_id;
+  double m_clampedShare = 0.0;
 };
 
 class VoxelSteps final : public PerStep {
@@ -116,6 +138,7 @@ class VoxelSteps final : public PerStep {
         }
     }
     sharpen(m_field.layout, again, m_field.values);
+    measureClamped();
   }
 
   // Trilinear over the eight nearest voxel centres, inactive ones dark.
@@ -152,7 +175,10 @@ class ParticleSteps final : public PerStep {
   ParticleSteps(const Medium& medium, LightField field, RandomKey key)
       : PerStep(medium, std::move(field)), m_gather(m_field, medium), m_key(key) {
     if (!m_field.layout.holdsPower()) sharpenFluence();
-    if (m_field.layout.merge == Merge::sampled) accumulate();
+    if (m_field.layout.merge == Merge::sampled)
+      accumulate();
+    else
+      measureClamped();
   }
 
   Inscatter at(const Vec3f& p, const Vec3f& wo, const Coefficients& c) const override {

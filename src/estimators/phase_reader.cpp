@@ -6,7 +6,7 @@ namespace photosphere::estimators {
 
 PhaseReader::PhaseReader(const LightFieldLayout& layout, const transport::Medium& medium, int phase)
     : m_layout(layout), m_medium(medium), m_phase(phase) {
-  if (layout.basis != Basis::histogram) return;
+  if (layout.basis == Basis::view) return;
   const auto& function = medium.phases()[static_cast<std::size_t>(phase)];
   const sphere::BinWeights::Phase plain = [&function](const Vec3f& w, const Vec3f& wo) {
     return static_cast<double>(function.evaluate(w, wo));
@@ -18,7 +18,7 @@ PhaseReader::PhaseReader(const LightFieldLayout& layout, const transport::Medium
     restore(plain);
     return;
   }
-  if (!smooths && !layout.keepsMeans()) {
+  if (layout.basis == Basis::histogram && !smooths && !layout.keepsMeans()) {
     m_bins.emplace(layout.binShares(), plain, function.g(), sphere::Reconstruction::smooth);
     return;
   }
@@ -26,6 +26,16 @@ PhaseReader::PhaseReader(const LightFieldLayout& layout, const transport::Medium
   sphere::LegendreMoments moments = sphere::phaseMoments(plain);
   if (smooths)
     moments = sphere::convolved(moments, sphere::kernelMoments(layout.smoothing(), moments.size()));
+  if (layout.basis == Basis::sphericalHarmonics) {
+    // Convolving with a function of the angle scales degree l by its moment (Funk & Hecke): exact
+    // up to the order, at the moments' own length zero.
+    m_harmonics.emplace(layout.order);
+    for (int i = 0; i < m_harmonics->count(); ++i) {
+      const auto l = static_cast<std::size_t>(sphere::SphericalHarmonics::degree(i));
+      m_moments.push_back(l < moments.size() ? static_cast<float>(moments[l]) : 0.0f);
+    }
+    return;
+  }
   if (layout.keepsMeans()) {
     m_lobes.emplace(moments);
     return;
@@ -56,6 +66,11 @@ void PhaseReader::turn(const Vec3f& wo, Toward& toward) const {
   if (m_bins) {
     toward.weights.resize(bins);
     m_bins->weights(wo, toward.weights.data());
+  } else if (m_harmonics) {
+    toward.weights.resize(bins);
+    m_harmonics->evaluate(wo, toward.weights.data());
+    for (std::size_t i = 0; i < bins; ++i)
+      toward.weights[i] *= m_moments[i];
   } else if (!m_directions.empty()) {
     const auto& function = m_medium.phases()[static_cast<std::size_t>(m_phase)];
     toward.weights.assign(bins, 0.0f);

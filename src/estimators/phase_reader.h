@@ -7,6 +7,7 @@
 
 #include "photosphere/estimators/light_field.h"
 #include "photosphere/sphere/bin_weights.h"
+#include "photosphere/sphere/spherical_harmonics.h"
 #include "photosphere/sphere/zonal.h"
 
 namespace photosphere::estimators {
@@ -20,13 +21,13 @@ class PhaseReader {
   /// What all carriers seen from one direction share. Reused from one direction to the next.
   struct Toward {
     Vec3f wo{0.0f};              ///< unit propagation direction toward the eye
-    std::vector<float> weights;  ///< of bins [1/sr]
+    std::vector<float> weights;  ///< of bins [1/sr] or harmonics [sr^-1/2]
     std::vector<float> scratch;
   };
   void turn(const Vec3f& wo, Toward& toward) const;
 
   /// Integral of phase times light over directions, of one set of one carrier. Not clamped: where
-  /// light is peaked the smooth reconstruction can dip below zero.
+  /// light is peaked the smooth reconstruction, and harmonics cut at an order, can dip below zero.
   Rgb read(const float* set, const Toward& toward) const;
   /// The part of one bin.
   Rgb readBin(const float* set, int bin, const Toward& toward) const;
@@ -43,6 +44,8 @@ class PhaseReader {
   int m_phase;
   // One of these, by layout; none for the view basis, whose values hold the phase function.
   std::optional<sphere::BinWeights> m_bins;
+  std::optional<sphere::SphericalHarmonics> m_harmonics;
+  std::vector<float> m_moments;              // of the phase function, by harmonic
   std::optional<sphere::LobeTable> m_lobes;  // Representative::mean
   std::vector<Vec3f> m_directions;           // K restored directions
   std::vector<float> m_restored;             // share of each bin in each, [direction][bin]

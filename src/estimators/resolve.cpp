@@ -39,6 +39,18 @@ Rgb readOneBin(const LightFieldLayout& layout, const PhaseReader& reader, const 
   return reader.readBin(set, chosen, toward) * (total / binPower(layout, set, chosen));
 }
 
+// Light that was clamped and light that is read, summed over carriers in their order.
+struct Clamped {
+  double below = 0, light = 0;
+  void count(Colours& colours) {
+    for (Vec4f& colour : colours) {
+      below += static_cast<double>(colour.w);
+      light += static_cast<double>(meanComponent(Rgb(colour)));
+      colour.w = 0.0f;
+    }
+  }
+};
+
 // Folds directions and phase into one colour per carrier.
 Colours foldPhase(const LightField& field, const View& view, std::size_t set,
                   const PhaseReader& reader, RandomKey key) {
@@ -61,7 +73,10 @@ Colours foldPhase(const LightField& field, const View& view, std::size_t set,
       } else {
         colour = reader.read(values, toward);
       }
-      colours[i] = Vec4f(colour, 0.0f);
+      // Harmonics, and a histogram's smooth reconstruction, dip below zero beside a sharp peak;
+      // light does not. The fourth value notes by how much.
+      const Rgb light = sampled ? colour : glm::max(colour, Rgb(0.0f));
+      colours[i] = Vec4f(light, meanComponent(light - colour));
     }
   });
   return colours;
@@ -89,7 +104,8 @@ class ResolvedField final : public InscatterSource {
     for (std::size_t k = 0; k < phases; ++k) {
       const PhaseReader reader(field.layout, medium, static_cast<int>(k));
       for (std::size_t set = 0; set < sets; ++set) {
-        const Colours folded = foldPhase(field, view, set, reader, key);
+        Colours folded = foldPhase(field, view, set, reader, key);
+        m_clamped.count(folded);
         m_fields[set * phases + k] =
             layOut(lattice, gather ? spreadParticles(field, lattice, *gather, folded)
                                    : sharpened(smoothVoxels(lattice, folded, field.layout.kernel,
@@ -112,6 +128,9 @@ class ResolvedField final : public InscatterSource {
     return result;
   }
   bool carriesUnscattered() const override { return m_unscattered; }
+  double clampedShare() const override {
+    return m_clamped.light > 0 ? m_clamped.below / m_clamped.light : 0.0;
+  }
 
  private:
   // From particles to the voxels that lookups read.
@@ -138,6 +157,7 @@ class ResolvedField final : public InscatterSource {
   bool m_power;
   Vec3f m_firstNode{0.0f};
   float m_inverseEdge = 1.0f;
+  Clamped m_clamped;
   std::vector<Field> m_fields;
 };
 

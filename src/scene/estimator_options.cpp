@@ -90,13 +90,17 @@ LightFieldLayout layoutOf(const ParamValues& e, bool lightCache) {
   l.truncation = e.real("truncation");
   l.directions = static_cast<int>(e.integer("directions"));
   l.rows = static_cast<int>(e.integer("rows"));
+  l.order = static_cast<int>(e.integer("order"));
+  // Rays after the first bounce come from everywhere.
+  if (e.integer("final_gather") > 0) l.evaluate = Evaluate::perStep;
   l.lightVoxel = e.real("light_voxel");
   const bool ofBins = l.direction != DirectionDeposit::nearest ||
                       l.representative != Representative::bin || l.merge != Merge::full ||
                       l.evaluate != Evaluate::perView || l.angularKernel != AngularKernel::none;
   const std::string& basis = e.text("basis");
-  l.basis = basis == "view" || (basis == "auto" && !lightCache && !ofBins) ? Basis::view
-                                                                           : Basis::histogram;
+  l.basis = basis == "spherical_harmonics" ? Basis::sphericalHarmonics
+            : basis == "view" || (basis == "auto" && !lightCache && !ofBins) ? Basis::view
+                                                                             : Basis::histogram;
   return l;
 }
 
@@ -105,6 +109,18 @@ void checkEstimator(const ParamValues& e, const std::string& place) {
     if (wrong) throw ConfigError(fmt::format("{}: {}", place, message));
   };
   const bool cached = !e.text("cache").empty();
+  const bool gathers = e.integer("final_gather") > 0;
+  if (gathers && e.text("type") != "photosphere")
+    throw ConfigError(
+        fmt::format("{}: 'final_gather' looks the photosphere up; it needs type = "
+                    "\"photosphere\", not \"{}\"",
+                    place, e.text("type")));
+  refuse(gathers && e.text("basis") == "view",
+         "'final_gather' reads light toward every direction, and basis = \"view\" holds it toward "
+         "one camera; choose \"histogram\" or \"spherical_harmonics\"");
+  refuse(gathers && e.given("evaluate") && e.text("evaluate") == "per_view",
+         "'final_gather' reads light toward every direction: leave 'evaluate' out, or set it to "
+         "\"per_step\"");
   const LightFieldLayout layout = layoutOf(e, cached);
   refuse(e.real("deposit_radius") > 0 && !layout.holdsPower(),
          "'deposit_radius' needs carrier = \"particles\" and deposit = \"collision\"; elsewhere "
@@ -138,7 +154,9 @@ std::string describeLayout(const LightFieldLayout& l) {
   std::string text = fmt::format(
       "{}, {}, {}, {} channel{}{}", l.carrier == Carrier::particles ? "particles" : "voxels",
       l.basis == Basis::view ? "view"
-                             : fmt::format("histogram of {} bins ({} rows)", l.bins(), l.rows),
+      : l.basis == Basis::sphericalHarmonics
+          ? fmt::format("{} spherical harmonics (order {})", l.bins(), l.order)
+          : fmt::format("histogram of {} bins ({} rows)", l.bins(), l.rows),
       l.deposit == Deposit::collision ? "collision" : "track_length", l.channels,
       l.channels == 1 ? "" : "s",
       l.holdsPower() ? (l.energy == EnergyRule::scatter ? ", scatter" : ", gather") : "");

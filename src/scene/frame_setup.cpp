@@ -12,6 +12,7 @@
 #include "photosphere/phase/phase.h"
 #include "photosphere/volume/rasterize.h"
 #include "smoke_source.h"
+#include "volume_emission.h"
 
 namespace photosphere::scene {
 
@@ -40,6 +41,7 @@ std::uint64_t memoryBudget(const SceneFile& scene) {
 transport::MediumVolume placeVolume(const VolumeEntry& entry, const VolumeSource& source,
                                     const lights::LocalSpace& space, std::uint64_t budget) {
   transport::MediumVolume placed;
+  if (!source.density) return placed;
   placed.name = source.density.name();
   placed.density = volume::bricksFromGrid(source.density, 0, source.path, false, budget);
   placed.localFromNode = localFromWorld(space) * source.worldFromIndex(source.density) *
@@ -59,12 +61,19 @@ transport::MediumVolume placeVolume(const VolumeEntry& entry, const VolumeSource
   return placed;
 }
 
+// True when something in the source can be seen at this density scale.
+bool visible(const VolumeSource& source, double densityScale) {
+  const bool smoke = source.density && !source.density.activeBounds().empty() && densityScale > 0;
+  return smoke || (source.emission && !source.emission.activeBounds().empty());
+}
+
 // Two passes: where the smoke is, then the smoke about its own centre.
 void buildMedium(const SceneFile& scene, std::int64_t cacheFrame, bool wantParticles,
                  FrameSetup& setup) {
   std::vector<VolumeSource> sources;
+  const bool glows = scene.effects.text("emission") != "off";
   for (const VolumeEntry& entry : scene.volumes) {
-    sources.push_back(readVolume(scene, entry, cacheFrame, wantParticles));
+    sources.push_back(readVolume(scene, entry, cacheFrame, wantParticles, glows));
     setup.readSeconds += sources.back().readSeconds;
     setup.rasterizeSeconds += sources.back().rasterizeSeconds;
     setup.worldBounds.grow(sources.back().bounds());
@@ -80,15 +89,19 @@ void buildMedium(const SceneFile& scene, std::int64_t cacheFrame, bool wantParti
     for (const Vec3d& p : sources[i].particles)
       setup.particles.emplace_back(setup.space.localFromWorld(p));
     const double scale = scene.volumes[i].values.vec3("density_scale").x;
-    if (sources[i].bounds().empty() || !(scale > 0)) {
+    if (!visible(sources[i], scale)) {
       setup.notes.push_back(fmt::format("{}: no smoke in it at this frame", sources[i].path));
       continue;
     }
     placed.push_back(placeVolume(scene.volumes[i], sources[i], setup.space, setup.memoryBudget));
-    if (placed.back().density.empty()) placed.pop_back();
+    if (sources[i].emission)
+      placed.back().emission =
+          placeEmission(scene.volumes[i], sources[i], localFromWorld(setup.space),
+                        scene.output.text("colorspace"), setup.memoryBudget, setup.notes);
+    if (placed.back().density.empty() && placed.back().emission.field.empty()) placed.pop_back();
   }
   setup.medium = std::make_unique<transport::Medium>(std::move(placed));
-  // Active voxels may hold zeros: what frames the smoke is the box of what scatters.
+  // Active voxels may hold zeros: what frames the smoke is the box of what scatters or emits.
   setup.worldBounds = Box3d();
   if (const Box3d& local = setup.medium->bounds(); !local.empty()) {
     setup.worldBounds.grow(setup.space.worldFromLocal(local.min));
@@ -173,17 +186,22 @@ class EffectPlan {
 
   void decide() {
     Effects& e = m_setup.effects;
-    const std::string dark = m_setup.medium->bounds().empty() ? "there is no smoke"
-                             : m_setup.lights.empty()         ? "there is no light"
-                             : m_setup.medium->maximumAlbedo() <= 0
-                                 ? "the smoke only absorbs (albedo 0)"
-                                 : "";
+    const transport::Medium& medium = *m_setup.medium;
+    const bool glows = medium.emission() != nullptr;
+    const bool lamps = !m_setup.lights.empty();
+    const std::string inert = !(medium.majorants().maximum() > 0) ? "there is no smoke"
+                              : medium.maximumAlbedo() <= 0 ? "the smoke only absorbs (albedo 0)"
+                                                            : "";
+    const std::string dark = !inert.empty() ? inert : lamps ? "" : "there is no light";
     const bool single = m_scene.estimator.text("type") == "single";
-    e.emission = note("emission", false, "no volume emits");
+    e.emission = unlessOff("emission", glows ? "" : "no volume emits", "a volume emits");
     e.singleScattering = unlessOff("single_scattering", dark, "lights reach smoke that scatters");
-    e.multipleScattering =
-        unlessOff("multiple_scattering", single ? "estimator.type is single" : dark,
-                  "lights reach smoke that scatters");
+    e.multipleScattering = unlessOff(
+        "multiple_scattering",
+        single                   ? "estimator.type is single"
+        : glows && inert.empty() ? ""
+                                 : dark,
+        lamps ? "lights reach smoke that scatters" : "smoke scatters the light that it gives off");
     e.shadows = unlessOff("shadows", dark, "smoke casts shadows on itself");
     chromatic();
     e.motionBlur = note("motion_blur", false, "no volume has a velocity");
@@ -207,6 +225,8 @@ class EffectPlan {
   }
   void chromatic() {
     std::string coloured = m_setup.medium->isGrey() ? "" : "an albedo is coloured";
+    const transport::Emission* emission = m_setup.medium->emission();
+    if (emission && !emission->isGrey()) coloured = "the emission is coloured";
     for (const auto& light : m_setup.lights)
       if (!light->isGrey()) coloured = fmt::format("light '{}' is coloured", light->name());
     const std::string& wish = m_scene.effects.text("chromatic");
@@ -218,7 +238,7 @@ class EffectPlan {
     m_setup.effects.chromatic =
         wish == "on" ? note("chromatic", true, "on in the scene")
                      : note("chromatic", !coloured.empty(),
-                            coloured.empty() ? "lights and albedos are grey" : coloured);
+                            coloured.empty() ? "lights, albedos and emission are grey" : coloured);
   }
 
   const SceneFile& m_scene;

@@ -16,9 +16,9 @@ void report(const transport::TraceStatistics& traced, const estimators::LightFie
             FrameStatistics& s) {
   s.photonsEmitted = traced.photons;
   s.photonsScattered = traced.scatterings;
-  // Every flight after a scattering leaves light; the first one does where lamps with extent are
-  // kept.
-  s.photonsStored = layout.unscattered ? traced.flights : traced.scatterings;
+  // Every flight after a scattering or from the smoke's own emission leaves light; the first one of
+  // a lamp does where lamps with extent are kept.
+  s.photonsStored = layout.unscattered ? traced.flights : traced.scatterings + traced.born;
   s.photonsCapped = traced.capped;
   s.majorantViolations += traced.majorantViolations;
   s.energyEmitted = traced.emitted;
@@ -54,7 +54,7 @@ void noteIdleKeys(const SceneFile& scene, FrameSetup& setup) {
   std::vector<std::string_view> idle;
   for (const std::string_view key :
        {"photons", "radius", "deposit_radius", "spatial_kernel", "carrier", "basis", "deposit",
-        "rows", "energy", "direction", "representative", "light_voxel"})
+        "rows", "order", "energy", "direction", "representative", "light_voxel"})
     if (scene.estimator.given(key)) idle.push_back(key);
   if (!idle.empty())
     setup.notes.push_back(

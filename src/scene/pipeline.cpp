@@ -101,6 +101,15 @@ Light prepareLight(const SceneFile& scene, const RenderRequest& request, FrameSe
   const Stopwatch watch;
   light.source = estimators::resolve(*setup.medium, std::move(field), setup.view, setup.key);
   result.statistics.seconds.resolve = watch.seconds();
+  result.statistics.clampedLight = light.source->clampedShare();
+  if (result.statistics.clampedLight > 0.001)
+    setup.notes.push_back(fmt::format(
+        "{:.2g} of the stored light is below zero toward where it is read and counts as 0, a bias "
+        "of the basis beside sharp peaks; raise estimator.{}",
+        result.statistics.clampedLight,
+        setup.layout.basis == estimators::Basis::sphericalHarmonics
+            ? "order, or smooth with estimator.kernel"
+            : "rows"));
   return light;
 }
 
@@ -139,7 +148,10 @@ void renderLayers(const SceneFile& scene, const RenderRequest& request, const Fr
     render::MarchOptions march;
     march.step = static_cast<float>(scene.render.real("step"));
     march.effects = setup.effects;
-    const auto mode = setup.effects.singleScattering && setup.effects.shadows
+    const std::int64_t gathered = source ? scene.estimator.integer("final_gather") : 0;
+    march.gatherRays = static_cast<int>((gathered + options.samples - 1) / options.samples);
+    const bool shadowed = setup.effects.singleScattering && setup.effects.shadows;
+    const auto mode = shadowed || march.gatherRays > 0
                           ? shadowMode(scene.render.text("shadow"))
                           : render::ShadowMode::march;  // tabulates nothing
     const render::Shadows shadows(*setup.medium, setup.lights, mode,
@@ -228,7 +240,7 @@ FrameStatistics traceScene(const SceneFile& scene, std::int64_t frame, const std
   if (scene.estimator.text("basis") == "view")
     throw ConfigError(
         "estimator.basis = \"view\" holds light for one camera and cannot be cached; use "
-        "\"histogram\" or \"auto\"");
+        "\"histogram\", \"spherical_harmonics\" or \"auto\"");
   const Stopwatch total;
   const double cpuBefore = processCpuSeconds();
   SetupOptions options = setupOptions(request);

@@ -93,6 +93,44 @@ std::span<const Param> volumeParams() {
   return rows;
 }
 
+std::span<const Param> emissionParams() {
+  static constexpr Param rows[] = {
+      {.name = "grid",
+       .type = ParamType::text,
+       .unit = "",
+       .defaultText = "",
+       .help = "grid whose value * scale * color is the light given off [W m^-3 sr^-1]"},
+      {.name = "temperature",
+       .type = ParamType::text,
+       .unit = "",
+       .defaultText = "",
+       .help = "in place of `grid`: grid of temperatures, which give scale * the radiance of a "
+               "black body"},
+      {.name = "scale",
+       .unit = "W m^-3 sr^-1, or 1/m with `temperature`",
+       .defaultText = "1.0",
+       .help = "strength",
+       .min = 0,
+       .max = 1e30},
+      {.name = "color",
+       .type = ParamType::rgb,
+       .unit = "",
+       .defaultText = "1.0",
+       .help = "with `grid`",
+       .min = 0,
+       .max = 1e6},
+      {.name = "kelvin_scale",
+       .unit = "K",
+       .defaultText = "1.0",
+       .help = "with `temperature`: kelvin for each unit of value"},
+      {.name = "kelvin_offset",
+       .unit = "K",
+       .defaultText = "0.0",
+       .help = "with `temperature`: added; a value of 0 stays dark"},
+  };
+  return rows;
+}
+
 std::span<const Param> estimatorParams() {
   static constexpr Param rows[] = {
       {.name = "type",
@@ -143,8 +181,7 @@ std::span<const Param> estimatorParams() {
        .help =
            "how directions are stored; auto = view, or histogram with a light cache or an option "
            "of bins",
-       .choices = "auto|histogram|spherical_harmonics|view",
-       .unserved = "spherical_harmonics"},
+       .choices = "auto|histogram|spherical_harmonics|view"},
       {.name = "deposit",
        .type = ParamType::text,
        .unit = "",
@@ -229,16 +266,17 @@ std::span<const Param> estimatorParams() {
        .type = ParamType::integer,
        .unit = "",
        .defaultText = "4",
-       .help = "of spherical_harmonics",
+       .help = "of spherical_harmonics: (order + 1)^2 coefficients",
        .min = 0,
-       .served = false},
+       .max = 8},
       {.name = "final_gather",
        .type = ParamType::integer,
        .unit = "",
        .defaultText = "0",
-       .help = "rays a pixel that look the photosphere up after their first bounce",
+       .help = "rays a pixel that look the photosphere up after their first bounce, shared by the "
+               "camera samples",
        .min = 0,
-       .served = false},
+       .max = 1e6},
       {.name = "max_photons",
        .type = ParamType::integer,
        .unit = "",
@@ -286,8 +324,7 @@ std::span<const Param> effectsParams() {
        .unit = "",
        .defaultText = "auto",
        .help = "light that the smoke gives off",
-       .choices = states,
-       .unserved = "on"},
+       .choices = states},
       {.name = "single_scattering",
        .type = ParamType::text,
        .unit = "",

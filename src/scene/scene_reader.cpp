@@ -236,11 +236,35 @@ void SceneReader::readPhase(const toml::node& node, const std::string& path,
   }
 }
 
+void SceneReader::readEmission(const toml::node& node, const std::string& path,
+                               VolumeEntry& entry) const {
+  const std::string place = where(node, path, path);
+  const toml::table* from = node.as_table();
+  if (!from)
+    throw ConfigError(fmt::format(
+        "{}: 'emission' must be a table such as {{ grid = \"flame\", scale = 20.0 }}", place));
+  entry.emits = true;
+  for (const auto& [key, value] : *from) {
+    const std::string k(key.str());
+    const std::string at = where(value, path + "." + k, path);
+    entry.emission.set(k, hasRow(entry.emission, k) ? valueOf(value, k, at) : ParamValue(), at);
+  }
+  const bool thermal = !entry.emission.text("temperature").empty();
+  if (thermal == !entry.emission.text("grid").empty())
+    throw ConfigError(fmt::format(
+        "{}: 'emission' needs either 'grid' or 'temperature', the name of a grid", place));
+  for (const std::string_view key : {"color", "kelvin_scale", "kelvin_offset"})
+    if (entry.emission.given(key) && thermal == (key == "color"))
+      throw ConfigError(fmt::format("{}: '{}' does not go with '{}'", place, key,
+                                    thermal ? "temperature" : "grid"));
+}
+
 void SceneReader::readVolume(const toml::table& from, std::size_t index) {
   const std::string path = fmt::format("volume.{}", index);
   VolumeEntry entry;
   entry.where = where(from, path, path);
   entry.values = ParamValues(volumeParams());
+  entry.emission = ParamValues(emissionParams());
   entry.phaseValues =
       ParamValues(findPlugin(phase::phaseFunctions(), entry.phase, "phase", entry.where).params);
   for (const auto& [key, node] : from) {
@@ -251,7 +275,7 @@ void SceneReader::readVolume(const toml::table& from, std::size_t index) {
     } else if (k == "albedo") {
       readAlbedo(node, place, entry);
     } else if (k == "emission") {
-      notServed(place, "'emission'");
+      readEmission(node, path + ".emission", entry);
     } else {
       entry.values.set(k, hasRow(entry.values, k) ? valueOf(node, k, place) : ParamValue(), place);
     }

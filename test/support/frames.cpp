@@ -70,13 +70,26 @@ TestScene plumeScene(double g, int cells, int pixels) {
   return scene;
 }
 
+std::vector<Vec3f> seedParticles(const transport::Medium& medium, std::size_t count) {
+  std::vector<Vec3f> particles;
+  Rng rng(RandomKey::fromSeed(3, 0), RandomStream::particles, 0);
+  const Vec3f low(medium.bounds().min), extent(medium.bounds().extent());
+  const float largest = medium.majorants().maximum();
+  while (particles.size() < count) {
+    const Vec3f p = low + extent * Vec3f(rng.uniform(), rng.uniform(), rng.uniform());
+    if (rng.uniform() * largest < medium.extinction(p)) particles.push_back(p);
+  }
+  return particles;
+}
+
 render::FrameLayers renderPath(const TestScene& scene, int samples, std::uint64_t seed) {
   const auto path = render::makePathIntegrator(*scene.medium, scene.lights, {});
   return render::renderFrame(*scene.camera, *path, frameOptions(scene, samples, seed));
 }
 
 PhotosphereFrame renderPhotosphere(const TestScene& scene, estimators::LightFieldLayout layout,
-                                   std::uint64_t photons, std::uint64_t seed, int samples) {
+                                   std::uint64_t photons, std::uint64_t seed, int samples,
+                                   int gatherRays) {
   PhotosphereFrame frame;
   layout.phases = static_cast<int>(scene.medium->phases().size());
   if (layout.radius == 0) layout.radius = automaticRadius(*scene.medium, layout, photons);
@@ -91,16 +104,34 @@ PhotosphereFrame renderPhotosphere(const TestScene& scene, estimators::LightFiel
   frame.traceSeconds = trace.seconds();
   Stopwatch resolveWatch;
   const auto source = estimators::resolve(*scene.medium, field, scene.view(), options.key);
+  frame.clampedShare = source->clampedShare();
   const auto edge = static_cast<float>(scene.medium->voxelEdge());
   const render::Shadows shadows(*scene.medium, scene.lights, render::ShadowMode::grid, edge, 0);
   frame.resolveSeconds = resolveWatch.seconds();
   Stopwatch march;
+  render::MarchOptions marching;
+  marching.gatherRays = gatherRays;
   const auto integrator =
-      render::makeMarchIntegrator(*scene.medium, scene.lights, shadows, source.get(), {});
+      render::makeMarchIntegrator(*scene.medium, scene.lights, shadows, source.get(), marching);
   frame.layers =
       render::renderFrame(*scene.camera, *integrator, frameOptions(scene, samples, seed + 1000));
   frame.marchSeconds = march.seconds();
   return frame;
+}
+
+BlockDeviation deviationFromOne(const std::vector<Rgb>& image, int width, int block) {
+  const int height = static_cast<int>(image.size()) / width;
+  BlockDeviation off;
+  for (int by = 0; by < height; by += block)
+    for (int bx = 0; bx < width; bx += block) {
+      double sum = 0;
+      for (int y = by; y < by + block; ++y)
+        for (int x = bx; x < bx + block; ++x)
+          sum += static_cast<double>(image[static_cast<std::size_t>(y * width + x)].y);
+      off.mean += sum / static_cast<double>(image.size());
+      off.worst = std::max(off.worst, std::abs(sum / (block * block) - 1));
+    }
+  return off;
 }
 
 LayerError layerError(const std::vector<Rgb>& image, const std::vector<Rgb>& referenceA,

@@ -16,7 +16,7 @@
 namespace photosphere::estimators {
 
 enum class Carrier { voxels, particles };
-enum class Basis { histogram, view };
+enum class Basis { histogram, sphericalHarmonics, view };
 enum class Deposit { trackLength, collision };
 /// How a collision reaches particles (METHOD.md section 4): gather is eq. 7a, scatter eq. 7b.
 enum class EnergyRule { gather, scatter };
@@ -46,6 +46,7 @@ struct LightFieldLayout {
   EnergyRule energy = EnergyRule::gather;
   SpatialKernel kernel = SpatialKernel::epanechnikov;
   int rows = 2;      ///< 8 rows^2 direction bins (histogram)
+  int order = 4;     ///< (order + 1)^2 coefficients (sphericalHarmonics)
   int channels = 3;  ///< 1 where lights and media are grey
   int phases = 1;    ///< distinct phase functions (view)
   bool unscattered =
@@ -65,7 +66,11 @@ struct LightFieldLayout {
   double truncation = 3.0;  ///< of angularKernel [bandwidths]
   int directions = 128;     ///< K of eq. 9, 8 n^2; Merge::sampled
 
-  int bins() const { return basis == Basis::histogram ? 8 * rows * rows : phases; }
+  /// Values of one set and channel: bins, coefficients, or one for each phase function.
+  int bins() const {
+    if (basis == Basis::view) return phases;
+    return basis == Basis::histogram ? 8 * rows * rows : (order + 1) * (order + 1);
+  }
   /// Floats of one set (scattered, unscattered) of one carrier: [bin][channel], then for
   /// Representative::mean [bin][3], the sum of power times direction.
   int setSize() const { return bins() * (channels + (keepsMeans() ? 3 : 0)); }
@@ -84,8 +89,8 @@ struct LightFieldLayout {
 };
 
 /// Values on carriers, [carrier][set][bin][channel]. Histogram: fluence rate that arrives in the
-/// bin [W m^-2], or power [W] (holdsPower). View: the same times the phase function toward the eye
-/// [1/sr].
+/// bin [W m^-2], or power [W] (holdsPower). Spherical harmonics: the same light times Y_lm of the
+/// direction it travels in. View: times the phase function toward the eye [1/sr].
 struct LightField {
   LightFieldLayout layout;
   transport::SupportLattice lattice;  ///< light voxels; the carriers themselves for Carrier::voxels

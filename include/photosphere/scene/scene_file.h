@@ -18,6 +18,8 @@ struct VolumeEntry {
       albedoGrid;  ///< where `albedo` names a grid; else empty and `values` holds the number
   std::string phase = "henyey_greenstein";  ///< phase plug-in
   ParamValues phaseValues;                  ///< that plug-in's rows
+  bool emits = false;                       ///< `emission` was given
+  ParamValues emission;                     ///< emissionParams()
   std::string where;  ///< "scene.toml:12: [[volume]] 0", begins messages about it
 };
 
@@ -53,6 +55,8 @@ struct SceneFile {
 /// Rows of the tables that belong to no plug-in: for --help and `photosphere list`.
 std::span<const Param> sceneParams();
 std::span<const Param> volumeParams();
+/// Keys of `emission`, an inline table of a volume.
+std::span<const Param> emissionParams();
 std::span<const Param> estimatorParams();
 std::span<const Param> effectsParams();
 std::span<const Param> renderParams();
