@@ -206,7 +206,9 @@ TEST_P(Directions, PerStepIsPerViewFarAway) {
   const auto view = renderPhotosphere(scene, layout, kPhotons, 5, 1).layers.multiple;
   layout.evaluate = Evaluate::perStep;
   const auto step = renderPhotosphere(scene, layout, kPhotons, 5, 1).layers.multiple;
-  EXPECT_LT(largestDifference(step, view), means ? 0.3 : 0.02);
+  const double difference = largestDifference(step, view);
+  std::printf("  largest difference over the mean: %.5f\n", difference);
+  EXPECT_LT(difference, means ? 0.07 : 0.03);
 }
 
 INSTANTIATE_TEST_SUITE_P(Options, Directions, testing::ValuesIn(kOptions),
