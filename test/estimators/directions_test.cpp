@@ -184,12 +184,13 @@ TEST_P(Directions, DoNotMatterWhereScatteringIsIsotropic) {
 
 // Every option is another answer where scattering is not isotropic (else it would not be one).
 TEST_P(Directions, MatterWhereScatteringIsPeaked) {
-  if (std::string(GetParam().name) == "nearest") GTEST_SKIP() << "the one to differ from";
   const TestScene scene = sphereScene(6, 0.9, 0.7, 16, 16);
   LightFieldLayout layout = histogram();
-  const auto plain = renderPhotosphere(scene, layout, kPhotons / 4, 5, 1).layers.multiple;
+  LightFieldLayout other = layout;
   GetParam().set(layout);
+  if (std::string(GetParam().name) == "nearest") other.basis = Basis::view;
   const auto image = renderPhotosphere(scene, layout, kPhotons / 4, 5, 1).layers.multiple;
+  const auto plain = renderPhotosphere(scene, other, kPhotons / 4, 5, 1).layers.multiple;
   EXPECT_GT(largestDifference(image, plain), 0.02);
 }
 
@@ -205,7 +206,9 @@ TEST_P(Directions, PerStepIsPerViewFarAway) {
   const auto view = renderPhotosphere(scene, layout, kPhotons, 5, 1).layers.multiple;
   layout.evaluate = Evaluate::perStep;
   const auto step = renderPhotosphere(scene, layout, kPhotons, 5, 1).layers.multiple;
-  EXPECT_LT(largestDifference(step, view), means ? 0.3 : 0.02);
+  const double difference = largestDifference(step, view);
+  std::printf("  largest difference over the mean: %.5f\n", difference);
+  EXPECT_LT(difference, means ? 0.07 : 0.03);
 }
 
 INSTANTIATE_TEST_SUITE_P(Options, Directions, testing::ValuesIn(kOptions),
