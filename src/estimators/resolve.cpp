@@ -64,6 +64,8 @@ Colours foldPhase(const LightField& field, const View& view, std::size_t set,
     for (std::size_t i = begin; i < end; ++i) {
       reader.turn(view.toEye(carrierPosition(field, i)), toward);
       const float* values = field.values.data() + i * stride + offset;
+      // Not clamped: the smooth reconstruction dips below zero beside a sharp peak and gives that
+      // light back elsewhere. Neighbours together hold enough light to be positive.
       Rgb colour;
       if (sampled) {
         Rng rng(key, RandomStream::merge, i);
@@ -137,7 +139,7 @@ class ResolvedField final : public InscatterSource {
     Smoothed smoothed;
     smoothed.once = gather.atVoxels(lattice, folded);
     if (field.layout.holdsPower()) {
-      // Weights of drawn bins may be negative; light is not.
+      // Light is not negative, though weights of bins may be.
       for (Vec4f& colour : smoothed.once)
         colour = glm::max(colour, Vec4f(0.0f));
       return smoothed.once;

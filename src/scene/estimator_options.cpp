@@ -19,9 +19,9 @@ constexpr PresetValue kPaper[] = {
     {"carrier", "particles"}, {"basis", "histogram"},
     {"deposit", "collision"}, {"rows", "2"},
     {"direction", "nearest"}, {"representative", "bin"},
-    {"energy", "gather"},     {"merge", "sampled"},
+    {"energy", "scatter"},    {"merge", "sampled"},
     {"evaluate", "per_step"}, {"kernel", "gaussian"},
-    {"bandwidth", "0.5"},     {"truncation", "3.0"},
+    {"bandwidth", "0.3"},     {"truncation", "3.0"},
     {"directions", "128"},    {"spatial_kernel", "epanechnikov"},
 };
 constexpr Preset kPresets[] = {
@@ -139,10 +139,12 @@ void checkEstimator(const ParamValues& e, const std::string& place) {
   }
   if (!e.text("preset").empty()) return;  // it gives keys that another may leave without work
   const bool smooths = layout.angularKernel != sphere::AngularKernel::none;
-  refuse(!smooths && (e.given("bandwidth") || e.given("truncation")),
+  const ParamValues defaults(estimatorParams());
+  const auto changed = [&](std::string_view key) { return e.format(key) != defaults.format(key); };
+  refuse(!smooths && (changed("bandwidth") || changed("truncation")),
          "'bandwidth' and 'truncation' are those of 'kernel': set kernel = \"gaussian\" or "
          "\"epanechnikov\"");
-  refuse(e.given("directions") &&
+  refuse(changed("directions") &&
              !(layout.merge == Merge::sampled && layout.evaluate == Evaluate::perStep),
          "'directions' are restored with merge = \"sampled\" and evaluate = \"per_step\" alone; "
          "elsewhere directions are integrated");

@@ -28,7 +28,8 @@ struct Row {
 void onParticles(LightFieldLayout& l) {
   l.carrier = Carrier::particles;
   l.deposit = Deposit::collision;
-  l.radius = l.depositRadius = 0.05;
+  l.energy = EnergyRule::scatter;
+  l.radius = l.depositRadius = 0.04;
 }
 
 // Settings of preset = "paper".
@@ -37,62 +38,61 @@ void paper(LightFieldLayout& l) {
   l.merge = Merge::sampled;
   l.evaluate = Evaluate::perStep;
   l.angularKernel = AngularKernel::gaussian;
+  l.bandwidth = 0.3;
 }
 
-// Bounds are twice what was measured, 2026-11-22.
+// Bounds are about twice what was measured, 2026-11-22. What they say: kernels wider than a bin
+// brighten (they blur the forward peak of light into the eye); eq. 7a blurs light out of the
+// smoke's edge; one bin a particle is noise.
 const Row kRows[] = {
-    {"voxels, nearest", 0.05, 0.1, [](LightFieldLayout&) {}},
-    {"voxels, barycentric", 0.05, 0.1,
+    {"voxels, nearest", 0.03, 0.02, [](LightFieldLayout&) {}},
+    {"voxels, barycentric", 0.02, 0.015,
      [](LightFieldLayout& l) { l.direction = DirectionDeposit::barycentric; }},
-    {"voxels, kernel deposit 0.3", 0.05, 0.1,
+    {"voxels, kernel deposit 0.3", 0.02, 0.015,
      [](LightFieldLayout& l) {
        l.direction = DirectionDeposit::kernel;
        l.angularKernel = AngularKernel::gaussian;
        l.bandwidth = 0.3;
      }},
-    {"voxels, mean", 0.05, 0.1,
+    {"voxels, mean", 0.08, 0.02,
      [](LightFieldLayout& l) { l.representative = Representative::mean; }},
-    {"voxels, barycentric mean", 0.05, 0.1,
+    {"voxels, barycentric mean", 0.02, 0.022,
      [](LightFieldLayout& l) {
        l.direction = DirectionDeposit::barycentric;
        l.representative = Representative::mean;
      }},
-    {"voxels, gaussian 0.3", 0.05, 0.1,
+    {"voxels, gaussian 0.3", 0.1, 0.04,
      [](LightFieldLayout& l) {
        l.angularKernel = AngularKernel::gaussian;
        l.bandwidth = 0.3;
      }},
-    {"voxels, gaussian 0.5", 0.05, 0.1,
+    {"voxels, gaussian 0.5", 0.22, 0.1,
      [](LightFieldLayout& l) { l.angularKernel = AngularKernel::gaussian; }},
-    {"voxels, epanechnikov 0.5", 0.05, 0.1,
+    {"voxels, epanechnikov 0.5", 0.06, 0.026,
      [](LightFieldLayout& l) { l.angularKernel = AngularKernel::epanechnikov; }},
-    {"voxels, per step", 0.05, 0.1, [](LightFieldLayout& l) { l.evaluate = Evaluate::perStep; }},
-    {"particles, gather, per view", 0.3, 0.3, onParticles},
-    {"particles, scatter, per view", 0.3, 0.3,
+    {"voxels, per step", 0.03, 0.02, [](LightFieldLayout& l) { l.evaluate = Evaluate::perStep; }},
+    {"particles, gather, per view", 0.64, 2.7,
      [](LightFieldLayout& l) {
        onParticles(l);
-       l.energy = EnergyRule::scatter;
+       l.energy = EnergyRule::gather;
      }},
-    {"particles, gather, per view, sampled", 0.3, 0.3,
+    {"particles, scatter, per view", 0.11, 0.33, onParticles},
+    {"particles, scatter, per view, sampled", 0.11, 0.33,
      [](LightFieldLayout& l) {
        onParticles(l);
        l.merge = Merge::sampled;
      }},
-    {"particles, gather, per step, full", 0.3, 0.3,
+    {"particles, scatter, per step", 0.08, 0.2,
      [](LightFieldLayout& l) {
        onParticles(l);
        l.evaluate = Evaluate::perStep;
      }},
-    {"paper", 0.3, 0.3, paper},
-    {"paper, epanechnikov", 0.3, 0.3,
+    {"paper", 0.25, 0.3, paper},
+    {"paper, epanechnikov", 0.24, 0.3,
      [](LightFieldLayout& l) {
        paper(l);
        l.angularKernel = AngularKernel::epanechnikov;
-     }},
-    {"paper, 8 bins", 0.3, 0.3,
-     [](LightFieldLayout& l) {
-       paper(l);
-       l.rows = 1;
+       l.bandwidth = 0.7;  // holds about what the gaussian does within 0.3
      }},
 };
 
@@ -112,7 +112,7 @@ std::vector<Vec3f> seeded(const transport::Medium& medium, std::size_t count) {
 TEST(DirectionOptions, AgreeWithPathTracingOnThePlume) {
   if (kSanitized) GTEST_SKIP() << "a mean of many paths, too slow under a sanitizer";
   TestScene scene = plumeScene(0.7, 64, kPixels);
-  scene.particles = seeded(*scene.medium, 20000);
+  scene.particles = seeded(*scene.medium, 15000);
   const render::FrameLayers a = renderPath(scene, 192, 1), b = renderPath(scene, 192, 2);
   for (const Row& row : kRows) {
     LightFieldLayout layout;
@@ -120,7 +120,8 @@ TEST(DirectionOptions, AgreeWithPathTracingOnThePlume) {
     layout.channels = 1;
     row.set(layout);
     checkLayout(layout);
-    const PhotosphereFrame frame = renderPhotosphere(scene, layout, 200'000, 5);
+    const std::uint64_t photons = layout.carrier == Carrier::voxels ? 200'000 : 60'000;
+    const PhotosphereFrame frame = renderPhotosphere(scene, layout, photons, 5);
     EXPECT_EQ(frame.layers.nanSamples + frame.layers.negativeSamples, 0u) << row.name;
     const LayerError error =
         layerError(frame.layers.multiple, a.multiple, b.multiple, a.transmittance, kPixels);

@@ -77,9 +77,10 @@ std::vector<Vec3f> particlesIn(const TestScene& scene, int count) {
   return particles;
 }
 
-LightField trace(const TestScene& scene, const LightFieldLayout& layout) {
+LightField trace(const TestScene& scene, const LightFieldLayout& layout,
+                 std::uint64_t photons = kPhotons) {
   transport::TraceOptions options;
-  options.photons = kPhotons;
+  options.photons = photons;
   options.key = RandomKey::fromSeed(5, 0);
   transport::TraceStatistics statistics;
   LightFieldLayout whole = layout;
@@ -243,16 +244,18 @@ TEST(PerStep, FluenceOnParticlesAgreesWithPerView) {
 // One bin in place of all is right in the mean: over many draws, within five standard errors.
 TEST(Merge, SampledIsFullInTheMean) {
   if (kSanitized) GTEST_SKIP() << "a mean of many draws";
-  TestScene scene = sphereScene(6, 0.9, 0.7, 16, 16);
-  scene.particles = particlesIn(scene, 3000);
+  TestScene scene = sphereScene(6, 0.9, 0.4, 16, 16);
+  scene.particles = particlesIn(scene, 1000);
   LightFieldLayout layout = histogram();
+  layout.rows = 1;
+  layout.radius = layout.depositRadius = 0.1;
   layout.carrier = Carrier::particles;
   layout.deposit = Deposit::collision;
   const LightField full = trace(scene, layout);
   LightField sampled = full;
   sampled.layout.merge = Merge::sampled;
   const auto exact = resolve(*scene.medium, full, scene.view());
-  constexpr int draws = 200;
+  constexpr int draws = 100;
   for (const Vec3f& p : kPlaces) {
     const auto c = coefficientsAt(scene, p);
     double sum = 0, squares = 0;
@@ -371,16 +374,16 @@ TEST(Layout, RefusesWhatHasNoMeaning) {
 }
 
 TEST(LightCache, HoldsEveryWayOfStoringDirections) {
-  TestScene scene = sphereScene(8, 0.95, 0.5, 16, 16);
-  scene.particles = particlesIn(scene, 500);
+  const TestScene scene = sphereScene(8, 0.95, 0.5, 8, 16);
   const TemporaryFolder folder;
   for (const Option& option : kOptions)
     for (const int channels : {1, 3}) {
       LightFieldLayout layout = histogram();
+      layout.rows = channels == 1 ? 2 : 1;
       layout.channels = channels;
       layout.unscattered = channels == 3;
       option.set(layout);
-      const LightField field = trace(scene, layout);
+      const LightField field = trace(scene, layout, 500);
       const LightCacheKey key{"m", "l", {}};
       const auto path = folder / "light.vdb";
       writeLightCache(path, field, key);

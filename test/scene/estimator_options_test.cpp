@@ -30,9 +30,9 @@ TEST(Preset, PaperIsMinAndIhm2010) {
   EXPECT_EQ(e.integer("directions"), 128);
   // Keys beside it win, and what it says nothing of stays.
   const SceneFile other = parse({"estimator.preset=paper", "estimator.rows=1",
-                                 "estimator.energy=scatter", "estimator.merge=full"});
+                                 "estimator.energy=gather", "estimator.merge=full"});
   EXPECT_EQ(other.estimator.integer("rows"), 1);
-  EXPECT_EQ(other.estimator.text("energy"), "scatter");
+  EXPECT_EQ(other.estimator.text("energy"), "gather");
   EXPECT_EQ(other.estimator.text("merge"), "full");
   EXPECT_EQ(other.estimator.text("evaluate"), "per_step");
   EXPECT_EQ(other.estimator.integer("photons"), 1000000);
@@ -84,7 +84,8 @@ INSTANTIATE_TEST_SUITE_P(
                       Illegal{{"bandwidth=0.3"}, "kernel"}, Illegal{{"truncation=2"}, "kernel"},
                       Illegal{{"directions=72"}, "sampled"},
                       Illegal{{"preset=paper", "directions=100"}, "72 and 128"},
-                      Illegal{{"preset=paper", "carrier=voxels"}, "merge"},
+                      Illegal{{"preset=paper", "carrier=voxels"}, "energy"},
+        Illegal{{"preset=paper", "carrier=voxels", "energy=gather"}, "merge"},
                       Illegal{{"preset=paper", "basis=view"}, "histogram"}));
 
 // Options of bins make `auto` a histogram.
