@@ -31,7 +31,7 @@ TEST_F(GatherScene, GathersFromAHistogramOrHarmonics) {
   const double reference = mean(plain.layers.multiple);
   for (const char* basis : {"auto", "histogram", "spherical_harmonics"}) {
     const FrameResult r = renderScene(
-        make({"estimator.final_gather=24", std::string("estimator.basis=") + basis}), 1);
+        make({"estimator.final_gather=24", fmt::format("estimator.basis={}", basis)}), 1);
     EXPECT_NEAR(mean(r.layers.multiple), reference, 0.05 * reference) << basis;
     EXPECT_TRUE(contains(r.layout, "per_step")) << r.layout;
     EXPECT_NEAR(mean(r.layers.single), mean(plain.layers.single), 1e-6);
@@ -47,7 +47,7 @@ TEST_F(GatherScene, HarmonicsAreNamedAndCached) {
   EXPECT_TRUE(contains(direct.layout, "16 spherical harmonics (order 3)")) << direct.layout;
   const std::string cache = (m_folder / "light.vdb").string();
   traceScene(s, 1, cache);
-  const FrameResult cached = renderScene(make({"estimator.cache=" + cache}), 1);
+  const FrameResult cached = renderScene(make({fmt::format("estimator.cache={}", cache)}), 1);
   EXPECT_TRUE(contains(cached.layout, "order 3")) << cached.layout;
   EXPECT_EQ(cached.layers.multiple, direct.layers.multiple);
   // A lobe as sharp as this one rings at a low order: the light below zero is said.
