@@ -9,6 +9,7 @@
 #include "photosphere/core/sampling.h"
 #include "photosphere/estimators/light_cache.h"
 #include "photosphere/estimators/light_field.h"
+#include "photosphere/volume/vdb_file.h"
 #include "support/frames.h"
 #include "support/support.h"
 
@@ -322,6 +323,40 @@ TEST(Representative, MeanKeepsTheDirectionOfABeam) {
   EXPECT_LT(beamError(scene, layout), 0.01);
 }
 
+// What is kept beside a bin is the sum of power times direction: no longer than the power, along
+// the bin, and in sum over the bins the same vector whatever bins the light fell in.
+TEST(Representative, MeanIsTheSumOfPowerTimesDirection) {
+  const TestScene scene = sphereScene(6, 0.9, 0.6, 8, 16);
+  LightFieldLayout layout = histogram();
+  layout.representative = Representative::mean;
+  const LightField nearest = trace(scene, layout);
+  layout.direction = DirectionDeposit::barycentric;
+  const LightField shared = trace(scene, layout);
+  const sphere::Partition bins(layout.rows);
+  const auto stride = static_cast<std::size_t>(layout.valuesPerCarrier());
+  double total = 0, difference = 0, length = 0;
+  for (std::size_t i = 0; i < nearest.carriers(); ++i) {
+    const float* a = nearest.values.data() + i * stride;
+    const float* b = shared.values.data() + i * stride;
+    Vec3d sumA(0.0), sumB(0.0);
+    for (int j = 0; j < bins.size(); ++j) {
+      const float* mean = a + bins.size() + 3 * j;
+      const Vec3d m(mean[0], mean[1], mean[2]);
+      ASSERT_LE(glm::length(m), 1.001 * static_cast<double>(a[j]) + 1e-3);
+      if (glm::length(m) > 0.01) {
+        ASSERT_LT(sphere::angleBetween(Vec3f(glm::normalize(m)), bins.center(j)), 0.8f);
+      }
+      sumA += m;
+      sumB += Vec3d(b[bins.size() + 3 * j], b[bins.size() + 3 * j + 1], b[bins.size() + 3 * j + 2]);
+      total += static_cast<double>(a[j]);
+      length += glm::length(m);
+    }
+    difference += glm::length(sumA - sumB);
+  }
+  EXPECT_GT(length, 0.8 * total) << "light within a bin is nearly of one direction";
+  EXPECT_LT(difference, 1e-3 * total);
+}
+
 TEST(Layout, RefusesWhatHasNoMeaning) {
   const auto message = [](const std::function<void(LightFieldLayout&)>& set) -> std::string {
     LightFieldLayout layout = histogram();
@@ -396,6 +431,25 @@ TEST(LightCache, HoldsEveryWayOfStoringDirections) {
         EXPECT_EQ(back.layout.bandwidth, layout.bandwidth);
       }
     }
+}
+
+// Caches from before directions had a choice say nothing of it: nearest bins that keep no mean.
+TEST(LightCache, OlderOnesStillRead) {
+  const TestScene scene = sphereScene(8, 0.95, 0.5, 8, 16);
+  const TemporaryFolder folder;
+  const LightField field = trace(scene, histogram(), 500);
+  const LightCacheKey key{"m", "l", {}};
+  const auto path = folder / "light.vdb";
+  writeLightCache(path, field, key);
+  const volume::VdbFile file = volume::readVdb(path.string());
+  volume::ParticleSet points = volume::gridToPoints(file.find("light"));
+  EXPECT_EQ(points.metadata.erase("direction"), 1u);
+  EXPECT_EQ(points.metadata.erase("representative"), 1u);
+  volume::writeVdb(path, {volume::pointsToGrid(points, "light", 0.0)});
+  const LightField back = readLightCache(path, key, false);
+  EXPECT_EQ(back.values, field.values);
+  EXPECT_EQ(back.layout.direction, DirectionDeposit::nearest);
+  EXPECT_EQ(back.layout.representative, Representative::bin);
 }
 
 }  // namespace
