@@ -154,14 +154,15 @@ void printPlan(const scene::SceneFile& scene, std::int64_t frame,
             setup.camera->resolution().y, type, formatBox(setup.worldBounds));
   for (const scene::EffectState& effect : setup.effectStates)
     printLine("  {:<20} {:<4} {}", effect.name, effect.on ? "on" : "off", effect.why);
-  const bool lightField = type == "photosphere" && setup.effects.multipleScattering;
-  if (lightField)
-    printLine("  light field          {}", formatBytes(scene::predictedLightFieldBytes(setup)));
+  const bool storesLight = scene::storesLight(scene, setup);
+  if (storesLight)
+    printLine("  {:<20} {}", setup.photonMap ? "photon map" : "light field",
+              formatBytes(scene::predictedLightBytes(setup)));
   if (setup.memoryBudget > 0)
     printLine("  memory budget        {}", formatBytes(setup.memoryBudget));
   for (const std::string& note : setup.notes)
     log::info("{}", note);
-  scene::checkMemory(setup, lightField);
+  scene::checkMemory(setup, storesLight);
 }
 
 void printDryRun(std::int64_t frame, const std::string& output, std::int64_t cacheFrame,

@@ -8,6 +8,13 @@ namespace photosphere::estimators {
 
 using transport::Flight;
 
+std::vector<bool> wantsUnscattered(const transport::LightList& lights, bool unscattered) {
+  std::vector<bool> wants;
+  for (const auto& light : lights)
+    wants.push_back(unscattered && !light->isDelta());
+  return wants;
+}
+
 void FixedSums::add(std::size_t at, double value, std::uint32_t bits) {
   const double units = value / quantum;
   if (!(units < 4e18)) {
@@ -50,10 +57,8 @@ CarrierSums::CarrierSums(const transport::Medium& medium, const transport::Light
       m_channels(layout.channels),
       m_basis(directionalBasis(layout, medium, view)),
       m_key(key),
-      m_sums(sums) {
-  for (const auto& light : lights)
-    m_wantsUnscattered.push_back(layout.unscattered && !light->isDelta());
-}
+      m_sums(sums),
+      m_wantsUnscattered(wantsUnscattered(lights, layout.unscattered)) {}
 
 template <class B>
 void CarrierSums::add(const B& basis, const typename B::Along& along, const Flight& flight,

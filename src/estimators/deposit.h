@@ -10,6 +10,18 @@
 
 namespace photosphere::estimators {
 
+/// Which lamps' light is kept before its first event: those with extent, where that is asked for.
+std::vector<bool> wantsUnscattered(const transport::LightList& lights, bool unscattered);
+
+/// The set a flight belongs to: 0 = light scattered before or emitted by the smoke, which no other
+/// term carries to its next scattering; 1 = light as its lamp sent it. -1 = none: the lamp's own
+/// light is evaluated at march time.
+/// @param wantsUnscattered  by lamp
+inline int setOf(const transport::Flight& flight, const std::vector<bool>& wantsUnscattered) {
+  if (flight.scatterings > 0 || flight.light == transport::kEmittedBySmoke) return 0;
+  return wantsUnscattered[flight.light] ? 1 : -1;
+}
+
 /// Integer sums of one light field and the worth of one unit.
 struct FixedSums {
   std::vector<std::int64_t> sums;
@@ -33,12 +45,8 @@ class CarrierSums {
               const LightFieldLayout& layout, const View& view, RandomKey key, FixedSums& sums);
 
   const DirectionalBasis& basis() const { return m_basis; }
-  /// The set a flight belongs to: 0 = light scattered before or emitted by the smoke, which no
-  /// other term carries to its next scattering; 1 = light as its lamp sent it. -1 = none: the
-  /// lamp's own light is evaluated at march time.
   int setOf(const transport::Flight& flight) const {
-    if (flight.scatterings > 0 || flight.light == transport::kEmittedBySmoke) return 0;
-    return m_wantsUnscattered[flight.light] ? 1 : -1;
+    return estimators::setOf(flight, m_wantsUnscattered);
   }
   /// Adds `amount` (of the quantum's unit, by channel) that arrives at `p` to one carrier.
   /// @param counter  number of the next deposit within the flight

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "cell_grid.h"
 #include "photosphere/core/fast_math.h"
 #include "photosphere/core/types.h"
 #include "photosphere/estimators/light_field.h"
@@ -17,35 +18,20 @@ class ParticleIndex {
   /// Calls visit(particle, squared distance) for every particle within `radius` of p.
   template <class Visit>
   void forEachWithin(const Vec3f& p, float radius, const Visit& visit) const {
-    const Vec3i lo = cellOf(p - radius), hi = cellOf(p + radius);
-    for (int z = std::max(0, lo.z); z <= std::min(hi.z, m_dims.z - 1); ++z)
-      for (int y = std::max(0, lo.y); y <= std::min(hi.y, m_dims.y - 1); ++y)
-        for (int x = std::max(0, lo.x); x <= std::min(hi.x, m_dims.x - 1); ++x) {
-          const std::size_t cell = index({x, y, z});
-          for (std::uint32_t i = m_start[cell]; i < m_start[cell + 1]; ++i) {
-            const Vec3f d = m_positions[i] - p;
-            const float distance = glm::dot(d, d);
-            if (distance <= radius * radius)
-              visit(static_cast<std::size_t>(m_original[i]), distance);
-          }
-        }
+    m_grid.forEachRun(p, radius, [&](std::uint32_t begin, std::uint32_t end) {
+      for (std::uint32_t i = begin; i < end; ++i) {
+        const Vec3f d = m_positions[i] - p;
+        const float distance = glm::dot(d, d);
+        if (distance <= radius * radius)
+          visit(static_cast<std::size_t>(m_grid.order()[i]), distance);
+      }
+    });
   }
   /// The particle nearest to p; ties go to the lowest number.
   std::size_t nearest(const Vec3f& p) const;
 
  private:
-  Vec3i cellOf(const Vec3f& p) const;
-  std::size_t index(const Vec3i& c) const {
-    return (static_cast<std::size_t>(c.z) * static_cast<std::size_t>(m_dims.y) +
-            static_cast<std::size_t>(c.y)) *
-               static_cast<std::size_t>(m_dims.x) +
-           static_cast<std::size_t>(c.x);
-  }
-  Vec3f m_min{0.0f};
-  float m_inverseEdge = 1.0f;
-  float m_edge = 1.0f;
-  Vec3i m_dims{0};
-  std::vector<std::uint32_t> m_start, m_original;
+  CellGrid m_grid;
   std::vector<Vec3f> m_positions;
 };
 

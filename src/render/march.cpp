@@ -33,6 +33,7 @@ class MarchIntegrator final : public Integrator {
         m_step(static_cast<float>(medium.voxelEdge()) * options.step) {
     if (m_emission)
       m_step = std::min(m_step, static_cast<float>(m_emission->region().spacing) * options.step);
+    m_stepsPerLength = 1.0f / m_step;
     if (source && options.gatherRays > 0)
       m_gather.emplace(medium,
                        DirectLight(medium, lights, shadows, true, source->carriesUnscattered()),
@@ -65,6 +66,7 @@ class MarchIntegrator final : public Integrator {
   float march(const Segment& ray, RayOpacity* opacity, RayRadiance& result, Rng& rng,
               IntegratorCounters& counters) const {
     float transmittance = 1.0f;
+    const Medium::AlongRay extinction(m_medium, ray.origin, ray.direction);
     const float offset = rng.uniform();
     float done = 0.0f;  // the ray is integrated up to here
     for (volume::MajorantGrid::Walk walk(m_medium.majorants(), ray.origin, ray.direction, 0.0f,
@@ -75,18 +77,27 @@ class MarchIntegrator final : public Integrator {
       // The source inside a step varies by the extinction of the light on its way in, which the
       // midpoint rule sees to (depth)^2 / 24: dense smoke takes finer steps, in powers of two of
       // one lattice.
-      float h = m_step;
-      while (h * walk.majorant() > kStepDepth && h > m_step * kFinest)
+      float h = m_step, perLength = m_stepsPerLength;
+      while (h * walk.majorant() > kStepDepth && h > m_step * kFinest) {
         h *= 0.5f;
+        perLength *= 2.0f;
+      }
       float t0 = std::max(done, walk.begin());
-      while (t0 < end) {
-        // The next point of the step lattice beyond t0; a step may run on past the cell, where the
-        // following cell then begins later.
-        float t1 = (std::floor(t0 / h - offset) + 1.0f + offset) * h;
-        if (!(t1 > t0 + 1e-3f * h)) t1 += h;
-        t1 = std::min(t1, ray.length);
-        if (!(t1 > t0)) break;
-        transmittance = step({ray, t0, t1}, transmittance, opacity, result, rng, counters);
+      // The next point of the step lattice beyond t0; a step may run on past the cell, where the
+      // following cell then begins later.
+      for (auto k = static_cast<float>(static_cast<int>(t0 * perLength - offset + 1.0f)); t0 < end;
+           k += 1.0f) {
+        const float t1 = std::min((k + offset) * h, ray.length);
+        if (!(t1 > t0 + 1e-3f * h)) {
+          if (t1 == ray.length) break;
+          continue;
+        }
+        const float sigma = extinction(0.5f * (t0 + t1));
+        if (sigma > 0.0f)
+          transmittance = step({ray, t0, t1}, sigma, transmittance, opacity, result, rng, counters);
+        else if (m_emission)
+          result.emission += transmittance * (t1 - t0) *
+                             m_emission->at(ray.origin + ray.direction * (0.5f * (t0 + t1)));
         if (transmittance < kOpaque) return 0.0f;
         t0 = t1;
       }
@@ -95,22 +106,21 @@ class MarchIntegrator final : public Integrator {
     return transmittance;
   }
 
-  float step(const MarchStep& step, float transmittance, RayOpacity* opacity, RayRadiance& result,
-             Rng& rng, IntegratorCounters& counters) const {
+  // A step through extinction.
+  float step(const MarchStep& step, float sigma, float transmittance, RayOpacity* opacity,
+             RayRadiance& result, Rng& rng, IntegratorCounters& counters) const {
     const Segment& ray = step.ray;
     const float dx = step.t1 - step.t0;
     const float t = 0.5f * (step.t0 + step.t1);
     const Vec3f p = ray.origin + ray.direction * t;
     Coefficients c;
     if (const Rgb* albedo = m_medium.uniformAlbedo()) {
-      c.extinction = m_medium.extinction(p);
-      c.scattering[0] = c.extinction * *albedo;
+      c.extinction = sigma;
+      c.scattering[0] = sigma * *albedo;
     } else {
       m_medium.coefficients(p, c);
-    }
-    if (!(c.extinction > 0.0f)) {
-      if (m_emission) result.emission += transmittance * dx * m_emission->at(p);
-      return transmittance;
+      // The same place, but for rounding.
+      if (!(c.extinction > 0.0f)) return transmittance;
     }
     const float depth = c.extinction * dx;
     // (1 - exp(-x)) / x, its series where the difference would cancel.
@@ -139,7 +149,8 @@ class MarchIntegrator final : public Integrator {
   const estimators::InscatterSource* m_source;
   MarchOptions m_options;
   const transport::Emission* m_emission;  // nullptr where there is none
-  float m_step;
+  float m_step;                           // [m]
+  float m_stepsPerLength;                 // its inverse
   std::optional<FinalGather> m_gather;
 };
 

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "estimator_options.h"
+#include "photon_map_stage.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/frames.h"
 #include "photosphere/core/registry.h"
@@ -265,9 +266,13 @@ void buildLayout(const SceneFile& scene, const SetupOptions& options, FrameSetup
   l.radius = e.real("radius") * setup.space.metersPerUnit;
   if (!(l.radius > 0)) {
     l.radius = automaticRadius(*setup.medium, l, static_cast<std::uint64_t>(e.integer("photons")));
-    // About 20 particles where they fill space evenly: a ball of 3 spacings.
-    if (l.carrier == Carrier::particles)
-      l.radius = std::max(l.radius, 3.0 * carrierSpacing(setup.particles));
+    if (l.carrier == Carrier::particles) {
+      // About 20 particles where they fill space evenly: a ball of 3 spacings. Power is smoothed
+      // with the smoke it was left in, so it takes no more than that: what a wider radius blurs
+      // over the smoke's edge soon exceeds the noise that it removes (README.md).
+      const double spacings = 3.0 * carrierSpacing(setup.particles);
+      l.radius = l.holdsPower() && spacings > 0 ? spacings : std::max(l.radius, spacings);
+    }
   }
   const double deposit = e.real("deposit_radius") * setup.space.metersPerUnit;
   l.depositRadius = deposit > 0 ? deposit : l.radius;
@@ -289,10 +294,17 @@ FrameSetup setUpFrame(const SceneFile& scene, std::int64_t frame, const SetupOpt
   const std::int64_t seed = options.seed.value_or(scene.scene.integer("seed"));
   setup.key = RandomKey::fromSeed(static_cast<std::uint64_t>(seed),
                                   scene.scene.flag("seed_per_frame") ? frame : 0);
+  planPhotonMap(scene, setup);
   return setup;
 }
 
-std::uint64_t predictedLightFieldBytes(const FrameSetup& setup) {
+bool storesLight(const SceneFile& scene, const FrameSetup& setup) {
+  const std::string& type = scene.estimator.text("type");
+  return (type == "photosphere" || type == "photon_map") && setup.effects.multipleScattering;
+}
+
+std::uint64_t predictedLightBytes(const FrameSetup& setup) {
+  if (setup.photonMap) return estimators::photonMapBytes(*setup.photonMap, setup.photonMapPhotons);
   const estimators::LightFieldLayout& l = setup.layout;
   const auto values = static_cast<std::uint64_t>(l.valuesPerCarrier());
   // Per step the floats are sharpened, which takes as many again.
@@ -315,21 +327,26 @@ std::uint64_t predictedLightFieldBytes(const FrameSetup& setup) {
   return bytes + transport::SupportLattice(medium, edge, margin).size() * values * bytesEach;
 }
 
-void checkMemory(const FrameSetup& setup, bool lightField) {
+void checkMemory(const FrameSetup& setup, bool storedLight) {
   if (setup.memoryBudget == 0) return;
   const std::uint64_t smoke = setup.medium->memoryBytes();
-  const std::uint64_t light = lightField ? predictedLightFieldBytes(setup) : 0;
+  const std::uint64_t light = storedLight ? predictedLightBytes(setup) : 0;
   const Vec2i size = setup.camera->resolution();
   const std::uint64_t frame = static_cast<std::uint64_t>(size.x) *
                               static_cast<std::uint64_t>(size.y) *
-                              (6 * sizeof(Rgb) + 2 * sizeof(float));
+                              (6 * sizeof(Rgb) + 2 * sizeof(float)) *
+                              (setup.photonMap && setup.photonMap->passes > 1 ? 3 : 1);
   if (smoke + light + frame <= setup.memoryBudget) return;
+  const std::string_view less =
+      setup.photonMap
+          ? "Lower estimator.photons (with estimator.passes, as many photons in less memory)"
+          : "Raise estimator.light_voxel, lower estimator.rows (a histogram has 8 * rows^2 bins; "
+            "basis = \"view\" has one)";
   throw MemoryError(fmt::format(
       "this frame needs about {}: {} for the smoke, {} for stored light, {} for pixels; the budget "
-      "is {}. Raise estimator.light_voxel, lower estimator.rows (a histogram has 8 * rows^2 bins; "
-      "basis = \"view\" has one), lower the resolution, or raise render.memory_limit (-1 = none)",
+      "is {}. {}, lower the resolution, or raise render.memory_limit (-1 = none)",
       formatBytes(smoke + light + frame), formatBytes(smoke), formatBytes(light),
-      formatBytes(frame), formatBytes(setup.memoryBudget)));
+      formatBytes(frame), formatBytes(setup.memoryBudget), less));
 }
 
 Mat4d frameBox(const Box3d& box, const Vec3d& target, const Vec3d& up, double fovDegrees,

@@ -12,23 +12,6 @@ namespace photosphere::scene {
 
 namespace {
 
-void report(const transport::TraceStatistics& traced, const estimators::LightFieldLayout& layout,
-            FrameStatistics& s) {
-  s.photonsEmitted = traced.photons;
-  s.photonsScattered = traced.scatterings;
-  // Every flight after a scattering or from the smoke's own emission leaves light; the first one of
-  // a lamp does where lamps with extent are kept.
-  s.photonsStored = layout.unscattered ? traced.flights : traced.scatterings + traced.born;
-  s.photonsCapped = traced.capped;
-  s.majorantViolations += traced.majorantViolations;
-  s.energyEmitted = traced.emitted;
-  s.energyMissed = traced.missed;
-  s.energyAbsorbed = traced.absorbed;
-  s.energyEscaped = traced.escaped;
-  s.energyCapped = traced.cappedPower;
-  s.energyError = traced.imbalance();
-}
-
 // What light in the cache came from: every lamp but its name, in local space.
 std::string lightHash(const SceneFile& scene) {
   Hasher hasher;
@@ -89,11 +72,25 @@ estimators::LightField readField(const SceneFile& scene, bool allowStale, FrameS
   setup.layout = layout;
   noteIdleKeys(scene, setup);
   statistics.photonsEmitted = field.photons;
+  statistics.lightMemoryBytes = field.memoryBytes();
   statistics.seconds.read += watch.seconds();
   return field;
 }
 
 }  // namespace
+
+void addTraced(const transport::TraceStatistics& traced, FrameStatistics& s) {
+  s.photonsEmitted += traced.photons;
+  s.photonsScattered += traced.scatterings;
+  s.photonsCapped += traced.capped;
+  s.majorantViolations += traced.majorantViolations;
+  s.energyEmitted += traced.emitted;
+  s.energyMissed += traced.missed;
+  s.energyAbsorbed += traced.absorbed;
+  s.energyEscaped += traced.escaped;
+  s.energyCapped += traced.cappedPower;
+  s.energyError += traced.imbalance();
+}
 
 estimators::LightField lightField(const SceneFile& scene, const RenderRequest& request,
                                   FrameSetup& setup, FrameStatistics& statistics) {
@@ -106,7 +103,12 @@ estimators::LightField lightField(const SceneFile& scene, const RenderRequest& r
   transport::TraceStatistics traced;
   estimators::LightField field = estimators::traceLightField(
       *setup.medium, setup.lights, setup.layout, setup.view, setup.particles, options, traced);
-  report(traced, setup.layout, statistics);
+  addTraced(traced, statistics);
+  // Every flight after a scattering or from the smoke's own emission leaves light; the first one of
+  // a lamp does where lamps with extent are kept.
+  statistics.photonsStored =
+      setup.layout.unscattered ? traced.flights : traced.scatterings + traced.born;
+  statistics.lightMemoryBytes = field.memoryBytes();
   if (field.farPhotons > 0)
     setup.notes.push_back(fmt::format(
         "{} photons met no particle within the deposit radius and went to the nearest one",

@@ -5,6 +5,9 @@
 
 namespace photosphere::scene {
 
+/// Adds the counts and energies of photons traced to a frame's.
+void addTraced(const transport::TraceStatistics& traced, FrameStatistics& statistics);
+
 /// Fills photon counts, energies, and the seconds of tracing (or of reading a cache). Where a cache
 /// is read, `setup.layout` becomes the cache's.
 /// @throws what tracing and reading throw; InputError for a light cache of another medium or lights

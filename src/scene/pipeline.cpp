@@ -7,6 +7,7 @@
 
 #include "estimator_options.h"
 #include "light_stage.h"
+#include "photon_map_stage.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/frames.h"
 #include "photosphere/core/log.h"
@@ -83,34 +84,43 @@ std::vector<std::string> presentLayers(const FrameSetup& setup) {
   return names;
 }
 
-// The light of a frame, ready to be looked up; null where nothing asks for it.
-struct Light {
-  std::unique_ptr<estimators::InscatterSource> source;
-};
+// A basis that can go negative is clamped where it is read.
+void noteClamped(double share, FrameSetup& setup, FrameStatistics& statistics) {
+  statistics.clampedLight = share;
+  if (!(share > 0.001)) return;
+  setup.notes.push_back(fmt::format(
+      "{:.2g} of the stored light is below zero toward where it is read and counts as 0, a bias of "
+      "the basis beside sharp peaks; raise estimator.{}",
+      share,
+      setup.layout.basis == estimators::Basis::sphericalHarmonics
+          ? "order, or smooth with estimator.kernel"
+          : "rows"));
+}
 
-Light prepareLight(const SceneFile& scene, const RenderRequest& request, FrameSetup& setup,
-                   FrameResult& result) {
-  Light light;
-  const bool wanted =
-      scene.estimator.text("type") == "photosphere" && setup.effects.multipleScattering;
-  checkMemory(setup, wanted && scene.estimator.text("cache").empty());
-  if (!wanted) return light;
+std::string describe(const estimators::PhotonMapLayout& map) {
+  return fmt::format("photon map, {} channel{}, {}{}", map.channels, map.channels == 1 ? "" : "s",
+                     map.neighbors > 0 ? fmt::format("{} nearest", map.neighbors) : "all in reach",
+                     map.passes > 1 ? fmt::format(", {} passes", map.passes) : "");
+}
+
+// The light of one pass of a frame, ready to be looked up; null where nothing asks for it.
+std::unique_ptr<estimators::InscatterSource> prepareLight(const SceneFile& scene,
+                                                          const RenderRequest& request, int pass,
+                                                          FrameSetup& setup, FrameResult& result) {
+  if (!storesLight(scene, setup)) return nullptr;
+  if (setup.photonMap) {
+    result.layout = describe(*setup.photonMap);
+    result.radius = setup.photonMap->radius / setup.space.metersPerUnit;
+    return photonMapPass(scene, setup, pass, result.statistics);
+  }
   estimators::LightField field = lightField(scene, request, setup, result.statistics);
   result.layout = describeLayout(setup.layout);
   result.radius = setup.layout.radius / setup.space.metersPerUnit;
   const Stopwatch watch;
-  light.source = estimators::resolve(*setup.medium, std::move(field), setup.view, setup.key);
+  auto source = estimators::resolve(*setup.medium, std::move(field), setup.view, setup.key);
   result.statistics.seconds.resolve = watch.seconds();
-  result.statistics.clampedLight = light.source->clampedShare();
-  if (result.statistics.clampedLight > 0.001)
-    setup.notes.push_back(fmt::format(
-        "{:.2g} of the stored light is below zero toward where it is read and counts as 0, a bias "
-        "of the basis beside sharp peaks; raise estimator.{}",
-        result.statistics.clampedLight,
-        setup.layout.basis == estimators::Basis::sphericalHarmonics
-            ? "order, or smooth with estimator.kernel"
-            : "rows"));
-  return light;
+  noteClamped(source->clampedShare(), setup, result.statistics);
+  return source;
 }
 
 std::uint64_t shadowBudget(const FrameSetup& setup) {
@@ -132,37 +142,69 @@ render::FrameOptions frameOptions(const SceneFile& scene, const RenderRequest& r
   return options;
 }
 
-// Rays through the smoke; the estimator's answer is ready.
-void renderLayers(const SceneFile& scene, const RenderRequest& request, const FrameSetup& setup,
-                  const estimators::InscatterSource* source, FrameResult& result) {
-  const Stopwatch watch;
-  const bool paths = scene.estimator.text("type") == "path_traced";
-  const render::FrameOptions options = frameOptions(scene, request, setup, paths);
-  if (paths) {
-    render::PathOptions path;
-    path.maxScatter = static_cast<int>(scene.estimator.integer("max_scatter"));
-    path.effects = setup.effects;
-    const auto integrator = render::makePathIntegrator(*setup.medium, setup.lights, path);
-    result.layers = render::renderFrame(*setup.camera, *integrator, options);
-  } else {
-    render::MarchOptions march;
-    march.step = static_cast<float>(scene.render.real("step"));
-    march.effects = setup.effects;
-    const std::int64_t gathered = source ? scene.estimator.integer("final_gather") : 0;
-    march.gatherRays = static_cast<int>((gathered + options.samples - 1) / options.samples);
+// Rays through the smoke, for one pass of a frame or several.
+class LayerRenderer {
+ public:
+  LayerRenderer(const SceneFile& scene, const RenderRequest& request, const FrameSetup& setup)
+      : m_setup(setup),
+        m_paths(scene.estimator.text("type") == "path_traced"),
+        m_options(frameOptions(scene, request, setup, m_paths)) {
+    m_path.maxScatter = static_cast<int>(scene.estimator.integer("max_scatter"));
+    m_path.effects = m_march.effects = setup.effects;
+    m_march.step = static_cast<float>(scene.render.real("step"));
+    if (m_paths) return;
+    if (storesLight(scene, setup))
+      m_march.gatherRays = static_cast<int>(
+          (scene.estimator.integer("final_gather") + m_options.samples - 1) / m_options.samples);
     const bool shadowed = setup.effects.singleScattering && setup.effects.shadows;
-    const auto mode = shadowed || march.gatherRays > 0
+    const auto mode = shadowed || m_march.gatherRays > 0
                           ? shadowMode(scene.render.text("shadow"))
                           : render::ShadowMode::march;  // tabulates nothing
-    const render::Shadows shadows(*setup.medium, setup.lights, mode,
-                                  march.step * static_cast<float>(setup.medium->voxelEdge()),
-                                  shadowBudget(setup));
-    const auto integrator =
-        render::makeMarchIntegrator(*setup.medium, setup.lights, shadows, source, march);
-    result.layers = render::renderFrame(*setup.camera, *integrator, options);
+    m_shadows.emplace(*setup.medium, setup.lights, mode,
+                      m_march.step * static_cast<float>(setup.medium->voxelEdge()),
+                      shadowBudget(setup));
   }
-  dropLayers(setup.effects, result.layers);
-  result.statistics.seconds.march = watch.seconds();
+
+  /// @param source  the estimator's answer; may be null
+  render::FrameLayers render(const estimators::InscatterSource* source, int pass) const {
+    render::FrameOptions options = m_options;
+    options.firstSample = pass * options.samples;
+    const auto integrator =
+        m_paths ? render::makePathIntegrator(*m_setup.medium, m_setup.lights, m_path)
+                : render::makeMarchIntegrator(*m_setup.medium, m_setup.lights, *m_shadows, source,
+                                              m_march);
+    render::FrameLayers layers = render::renderFrame(*m_setup.camera, *integrator, options);
+    dropLayers(m_setup.effects, layers);
+    return layers;
+  }
+
+ private:
+  const FrameSetup& m_setup;
+  bool m_paths;
+  render::FrameOptions m_options;
+  render::PathOptions m_path;
+  render::MarchOptions m_march;
+  std::optional<render::Shadows> m_shadows;
+};
+
+// Light and rays, once, or again and again for a progressive photon map.
+void renderLayers(const SceneFile& scene, const RenderRequest& request, FrameSetup& setup,
+                  FrameResult& result) {
+  checkMemory(setup, storesLight(scene, setup) && scene.estimator.text("cache").empty());
+  const int passes = setup.photonMap ? setup.photonMap->passes : 1;
+  std::optional<LayerRenderer> renderer;
+  render::FrameMean mean;
+  for (int pass = 0; pass < passes; ++pass) {
+    const auto source = prepareLight(scene, request, pass, setup, result);
+    const Stopwatch watch;
+    if (!renderer) renderer.emplace(scene, request, setup);
+    if (passes == 1)
+      result.layers = renderer->render(source.get(), 0);
+    else
+      mean.add(renderer->render(source.get(), pass));
+    result.statistics.seconds.march += watch.seconds();
+  }
+  if (passes > 1) result.layers = mean.mean();
 }
 
 void finish(const FrameSetup& setup, double cpuBefore, FrameResult& result) {
@@ -219,9 +261,8 @@ FrameResult renderScene(const SceneFile& scene, std::int64_t frame, const Render
   result.estimator = scene.estimator.text("type");
   result.seed = request.seed.value_or(scene.scene.integer("seed"));
 
-  const Light light = prepareLight(scene, request, setup, result);
+  renderLayers(scene, request, setup, result);
   result.notes = setup.notes;
-  renderLayers(scene, request, setup, light.source.get(), result);
   finish(setup, cpuBefore, result);
   checkSamples(result.layers);
   result.statistics.seconds.total = total.seconds();
@@ -231,9 +272,9 @@ FrameResult renderScene(const SceneFile& scene, std::int64_t frame, const Render
 FrameStatistics traceScene(const SceneFile& scene, std::int64_t frame, const std::string& output,
                            const RenderRequest& request) {
   if (scene.estimator.text("type") != "photosphere")
-    throw ConfigError(fmt::format(
-        "estimator.type = \"{}\" stores no light; tracing a light cache needs \"photosphere\"",
-        scene.estimator.text("type")));
+    throw ConfigError(
+        fmt::format("estimator.type = \"{}\" has no light cache; tracing one needs \"photosphere\"",
+                    scene.estimator.text("type")));
   if (!scene.estimator.text("cache").empty())
     throw ConfigError(
         "estimator.cache is set: the light was traced already; remove it to trace anew");

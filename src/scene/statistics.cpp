@@ -28,6 +28,7 @@ std::string statsJson(const FrameStatistics& s) {
                      {"scattered", s.photonsScattered},
                      {"stored", s.photonsStored},
                      {"capped", s.photonsCapped}};
+  json["light_memory_bytes"] = s.lightMemoryBytes;
   json["energy_watts"] = {
       {"emitted", channels(s.energyEmitted)},   {"missed", channels(s.energyMissed)},
       {"absorbed", channels(s.energyAbsorbed)}, {"escaped", channels(s.energyEscaped)},

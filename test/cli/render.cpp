@@ -219,6 +219,28 @@ TEST_F(Render, UsesATracedLightCache) {
   EXPECT_NE(result.err.find("--allow-stale"), std::string::npos) << result.err;
 }
 
+TEST_F(Render, PhotonMapInPasses) {
+  const std::vector<std::string> map{"-s", "estimator.type=photon_map", "-s", "estimator.passes=2"};
+  auto with = [&](std::vector<std::string> arguments) {
+    arguments.insert(arguments.end(), map.begin(), map.end());
+    return render(arguments);
+  };
+  const RunResult one =
+      with({"scene.toml", "-o", "a.exr", "--frames", "1", "-j", "1", "--stats", "s.json"});
+  ASSERT_EQ(one.exitCode, 0) << one.err;
+  const json stats = json::parse(readText(m_folder / "s.json"));
+  EXPECT_EQ(stats.at("photons").at("emitted"), 4000);
+  EXPECT_GT(stats.at("photons").at("stored"), 0);
+  EXPECT_GT(stats.at("light_memory_bytes"), 0);
+  ASSERT_EQ(with({"scene.toml", "-o", "b.exr", "--frames", "1", "-j", "3"}).exitCode, 0);
+  EXPECT_TRUE(samePixels("a.exr", "b.exr"));
+  const RunResult plan = with({"scene.toml", "-o", "c.exr", "--frames", "1", "--dry-run"});
+  EXPECT_NE(plan.out.find("photon map"), std::string::npos) << plan.out;
+  const RunResult list = run("list", {"estimators"});
+  EXPECT_NE(list.out.find("photon_map"), std::string::npos);
+  EXPECT_EQ(list.out.find("photon_map: more than 1 = progressive (not served"), std::string::npos);
+}
+
 TEST_F(Render, SignalEndsALongFrameWithoutTemporaries) {
   const auto before = namesIn(m_folder.path());
   const RunResult result = runShell(
@@ -282,7 +304,6 @@ const Refusal kRefusals[] = {
     {"Shard", {"trace", "scene.toml", "-o", "x.####.vdb", "--shard", "1/2"}, 2, "not served"},
     {"Plan", {"plan", "scene.toml"}, 2, "not served"},
     {"Merge", {"merge", "a.vdb", "b.vdb", "-o", "c.vdb"}, 2, "not served"},
-    {"Study", {"study", "scene.toml", "-o", "report/"}, 2, "not served"},
     {"CacheMissing", {"render", "scene.toml", "-o", "x.exr", "--frames", "9"}, 3, "smoke.0009.vdb"},
     {"GridMissing",
      {"render", "scene.toml", "-o", "x.exr", "--frames", "1", "-s", "volume.0.density=smog"},
@@ -292,6 +313,11 @@ const Refusal kRefusals[] = {
      {"render", "scene.toml", "-o", "x.exr", "--frames", "1", "-s", "render.memory_limit=1e-7"},
      5,
      "memory"},
+    {"PhotonMapMemory",
+     {"render", "scene.toml", "-o", "x.exr", "--frames", "1", "-s", "estimator.type=photon_map",
+      "-s", "estimator.photons=1000000000000", "-s", "render.memory_limit=1"},
+     5,
+     "estimator.photons"},
     {"FullDevice", {"render", "scene.toml", "-o", "full.exr", "--frames", "1"}, 6, "full.exr"},
     {"TargetIsFolder", {"render", "scene.toml", "-o", "folder.exr", "--frames", "1"}, 6, "folder"},
     {"TraceIntoExr", {"trace", "scene.toml", "-o", "x.exr"}, 2, ".vdb"},

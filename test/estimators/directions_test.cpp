@@ -6,6 +6,7 @@
 #include <functional>
 
 #include "photosphere/core/error.h"
+#include "photosphere/core/parallel.h"
 #include "photosphere/core/sampling.h"
 #include "photosphere/estimators/light_cache.h"
 #include "photosphere/estimators/light_field.h"
@@ -240,6 +241,28 @@ TEST(PerStep, FluenceOnParticlesAgreesWithPerView) {
   EXPECT_NEAR(mean(Evaluate::perStep, Merge::full) / view, 1.0, 0.02);
   EXPECT_NEAR(mean(Evaluate::perView, Merge::sampled) / view, 1.0, 0.02);
   EXPECT_NEAR(mean(Evaluate::perStep, Merge::sampled) / view, 1.0, 0.05);
+}
+
+// Signed sums, shares and draws are as indifferent to threads as the rest.
+TEST(PerStep, ThreadsDoNotChangeOneBit) {
+  TestScene scene = sphereScene(6, 0.9, 0.6, 16, 16);
+  scene.particles = particlesIn(scene, 1000);
+  for (const bool means : {false, true}) {
+    LightFieldLayout layout = histogram();
+    layout.carrier = Carrier::particles;
+    layout.deposit = Deposit::collision;
+    layout.evaluate = Evaluate::perStep;
+    layout.direction = DirectionDeposit::barycentric;
+    layout.representative = means ? Representative::mean : Representative::bin;
+    layout.merge = means ? Merge::full : Merge::sampled;
+    std::vector<Rgb> first;
+    for (const unsigned threads : {1u, 3u}) {
+      const ThreadLimit limit(threads);
+      const auto image = renderPhotosphere(scene, layout, 5'000, 5, 1).layers.multiple;
+      if (threads == 1) first = image;
+      EXPECT_EQ(image, first);
+    }
+  }
 }
 
 // One bin in place of all is right in the mean: over many draws, within five standard errors.

@@ -51,10 +51,14 @@ struct AgreementCase {
   Basis basis;
 };
 
+const char* nameOf(Basis basis) {
+  return basis == Basis::view ? "view" : basis == Basis::histogram ? "histogram" : "harmonics";
+}
+
 // What GoogleTest prints of a case.
 std::ostream& operator<<(std::ostream& out, const AgreementCase& c) {
-  return out << c.scene << (c.carrier == Carrier::voxels ? " voxels" : " particles")
-             << (c.basis == Basis::view ? " view" : " histogram");
+  return out << c.scene << (c.carrier == Carrier::voxels ? " voxels" : " particles") << ' '
+             << nameOf(c.basis);
 }
 
 class Agreement : public testing::TestWithParam<AgreementCase> {};
@@ -65,6 +69,7 @@ TEST_P(Agreement, WithPathTracing) {
   LightFieldLayout layout;
   layout.carrier = c.carrier;
   layout.basis = c.basis;
+  layout.order = 8;
   layout.channels = 1;
   const PhotosphereFrame frame = renderPhotosphere(j.scene, layout, kManyPhotons, 5);
   const LayerError total =
@@ -88,10 +93,12 @@ INSTANTIATE_TEST_SUITE_P(
     Scenes, Agreement,
     testing::Values(AgreementCase{"sphere", Carrier::voxels, Basis::view},
                     AgreementCase{"sphere", Carrier::voxels, Basis::histogram},
+                    AgreementCase{"sphere", Carrier::voxels, Basis::sphericalHarmonics},
                     AgreementCase{"sphere", Carrier::particles, Basis::view},
                     AgreementCase{"sphere", Carrier::particles, Basis::histogram},
                     AgreementCase{"plume", Carrier::voxels, Basis::view},
                     AgreementCase{"plume", Carrier::voxels, Basis::histogram},
+                    AgreementCase{"plume", Carrier::voxels, Basis::sphericalHarmonics},
                     AgreementCase{"plume", Carrier::particles, Basis::view},
                     AgreementCase{"plume", Carrier::particles, Basis::histogram},
                     AgreementCase{"column", Carrier::voxels, Basis::view},
@@ -100,7 +107,7 @@ INSTANTIATE_TEST_SUITE_P(
                     AgreementCase{"column", Carrier::particles, Basis::histogram}),
     [](const auto& row) {
       return row.param.scene + (row.param.carrier == Carrier::voxels ? "_voxels" : "_particles") +
-             (row.param.basis == Basis::view ? "_view" : "_histogram");
+             '_' + nameOf(row.param.basis);
     });
 
 // Albedo 1 in surroundings of radiance 1: every pixel is 1.

@@ -180,8 +180,7 @@ TEST_P(NotServedTest, IsRefusedAndSaysSo) {
 
 INSTANTIATE_TEST_SUITE_P(
     Contract, NotServedTest,
-    ::testing::Values("estimator.type=photon_map", "estimator.passes=2", "estimator.neighbors=50",
-                      "estimator.max_photons=50", "volume.0.velocity=v",
+    ::testing::Values("volume.0.velocity=v",
                       "volume.0.density_scale=[1, 2, 3]", "volume.0.phase={ type = \"rayleigh\" }",
                       "volume.0.phase={ type = \"draine\" }",
                       "volume.0.phase={ type = \"mie_fog\" }",

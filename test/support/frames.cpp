@@ -15,6 +15,23 @@ render::FrameOptions frameOptions(const TestScene& scene, int samples, std::uint
   return options;
 }
 
+// Marches a source that is ready.
+void marchFrame(const TestScene& scene, const estimators::InscatterSource& source,
+                std::uint64_t seed, int samples, int gatherRays, PhotosphereFrame& frame) {
+  const Stopwatch shadowWatch;
+  const auto edge = static_cast<float>(scene.medium->voxelEdge());
+  const render::Shadows shadows(*scene.medium, scene.lights, render::ShadowMode::grid, edge, 0);
+  frame.resolveSeconds += shadowWatch.seconds();
+  const Stopwatch march;
+  render::MarchOptions marching;
+  marching.gatherRays = gatherRays;
+  const auto integrator =
+      render::makeMarchIntegrator(*scene.medium, scene.lights, shadows, &source, marching);
+  frame.layers =
+      render::renderFrame(*scene.camera, *integrator, frameOptions(scene, samples, seed + 1000));
+  frame.marchSeconds = march.seconds();
+}
+
 std::vector<float> plane(const std::vector<Rgb>& image, int channel) {
   std::vector<float> values;
   values.reserve(image.size());
@@ -105,17 +122,26 @@ PhotosphereFrame renderPhotosphere(const TestScene& scene, estimators::LightFiel
   Stopwatch resolveWatch;
   const auto source = estimators::resolve(*scene.medium, field, scene.view(), options.key);
   frame.clampedShare = source->clampedShare();
-  const auto edge = static_cast<float>(scene.medium->voxelEdge());
-  const render::Shadows shadows(*scene.medium, scene.lights, render::ShadowMode::grid, edge, 0);
   frame.resolveSeconds = resolveWatch.seconds();
-  Stopwatch march;
-  render::MarchOptions marching;
-  marching.gatherRays = gatherRays;
-  const auto integrator =
-      render::makeMarchIntegrator(*scene.medium, scene.lights, shadows, source.get(), marching);
-  frame.layers =
-      render::renderFrame(*scene.camera, *integrator, frameOptions(scene, samples, seed + 1000));
-  frame.marchSeconds = march.seconds();
+  marchFrame(scene, *source, seed, samples, gatherRays, frame);
+  return frame;
+}
+
+PhotosphereFrame renderPhotonMap(const TestScene& scene, estimators::PhotonMapLayout layout,
+                                 std::uint64_t photons, std::uint64_t seed, int samples) {
+  PhotosphereFrame frame;
+  transport::TraceOptions options;
+  options.photons = photons;
+  options.key = RandomKey::fromSeed(seed, 0);
+  if (layout.radius == 0)
+    layout.radius = estimators::automaticRadius(
+        *scene.medium,
+        estimators::forecastPhotons(*scene.medium, scene.lights, layout.unscattered, options));
+  const Stopwatch trace;
+  const auto map =
+      estimators::tracePhotonMap(*scene.medium, scene.lights, layout, options, frame.statistics);
+  frame.traceSeconds = trace.seconds();
+  marchFrame(scene, *map, seed, samples, 0, frame);
   return frame;
 }
 

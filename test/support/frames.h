@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "photosphere/estimators/light_field.h"
+#include "photosphere/estimators/photon_map.h"
 #include "photosphere/image/metrics.h"
 #include "photosphere/render/frame.h"
 #include "support/media.h"
@@ -45,6 +46,11 @@ struct PhotosphereFrame {
 PhotosphereFrame renderPhotosphere(const TestScene& scene, estimators::LightFieldLayout layout,
                                    std::uint64_t photons, std::uint64_t seed, int samples = 4,
                                    int gatherRays = 0);
+
+/// A frame rendered by a photon map of one pass; layout.radius 0 = automatic. Tracing and building
+/// the map count as `traceSeconds`.
+PhotosphereFrame renderPhotonMap(const TestScene& scene, estimators::PhotonMapLayout layout,
+                                 std::uint64_t photons, std::uint64_t seed, int samples = 4);
 
 /// Error of one layer against the mean of two independent references, noise subtracted.
 struct LayerError {

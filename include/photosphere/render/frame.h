@@ -20,7 +20,8 @@ struct Crop {
 };
 
 struct FrameOptions {
-  int samples = 4;  ///< camera samples a pixel
+  int samples = 4;      ///< camera samples a pixel
+  int firstSample = 0;  ///< of the pixel's sequence of samples: passes of a frame continue it
   FilterKind filter = FilterKind::blackmanHarris;
   double filterWidth = 0.0;  ///< full width [pixels]; 0 = the filter's own
   Crop crop;
@@ -51,6 +52,20 @@ inline constexpr float kNoDepth = 1e10f;
 /// traced too, so pixels depend neither on the crop nor on threads. @throws InterruptedError
 FrameLayers renderFrame(const cameras::Camera& camera, const Integrator& integrator,
                         const FrameOptions& options);
+
+/// Mean of equal frames, each from passes of their own.
+class FrameMean {
+ public:
+  void add(const FrameLayers& frame);
+  /// Frames added so far.
+  int count() const { return m_count; }
+  /// The mean; counts of bad samples and of the integrator are sums. Empty before the first frame.
+  FrameLayers mean() const;
+
+ private:
+  FrameLayers m_sum;  // depth holds the sum of alpha times depth
+  int m_count = 0;
+};
 
 /// Pixel filter as a function of the offset from the pixel centre, not normalised.
 class PixelFilter {

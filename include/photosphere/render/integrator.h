@@ -34,6 +34,14 @@ struct IntegratorCounters {
   std::uint64_t scatterings = 0;  ///< real collisions of path tracing
   std::uint64_t capped = 0;       ///< paths ended by max_scatter
   double cappedRadiance = 0.0;    ///< throughput they still carried, summed
+
+  void add(const IntegratorCounters& other) {
+    tracking.majorantViolations += other.tracking.majorantViolations;
+    tracking.lookups += other.tracking.lookups;
+    scatterings += other.scatterings;
+    capped += other.capped;
+    cappedRadiance += other.cappedRadiance;
+  }
 };
 
 class Integrator {

@@ -12,6 +12,7 @@
 #include "photosphere/core/effects.h"
 #include "photosphere/core/rng.h"
 #include "photosphere/estimators/light_field.h"
+#include "photosphere/estimators/photon_map.h"
 #include "photosphere/lights/light.h"
 #include "photosphere/scene/scene_file.h"
 #include "photosphere/transport/medium.h"
@@ -50,7 +51,9 @@ struct FrameSetup {
   std::vector<EffectState> effectStates;
   RandomKey key;
   estimators::LightFieldLayout layout;  ///< of type `photosphere`; radius chosen where it was 0
-  std::uint64_t memoryBudget = 0;       ///< bytes that this frame may use; 0 = no limit
+  std::optional<estimators::PhotonMapLayout> photonMap;  ///< of type `photon_map`; radius chosen
+  std::uint64_t photonMapPhotons = 0;                    ///< that one pass is expected to store
+  std::uint64_t memoryBudget = 0;  ///< bytes that this frame may use; 0 = no limit
   double readSeconds = 0, rasterizeSeconds = 0;
   std::vector<std::string> notes;  ///< what the user should know
 };
@@ -62,14 +65,16 @@ struct FrameSetup {
 ///         the smoke alone passes the budget
 FrameSetup setUpFrame(const SceneFile& scene, std::int64_t frame, const SetupOptions& options = {});
 
-/// Predicted bytes of the light field that `setup.layout` asks for: carriers times values times 12
-/// (a 64-bit sum and its float).
-std::uint64_t predictedLightFieldBytes(const FrameSetup& setup);
+/// True when the frame stores light: multiple scattering is on and the estimator keeps it.
+bool storesLight(const SceneFile& scene, const FrameSetup& setup);
 
-/// @throws MemoryError (exit 5) naming numbers and remedies when smoke, light field and frame would
-/// pass
-///         the budget
-void checkMemory(const FrameSetup& setup, bool lightField);
+/// Predicted bytes of stored light. A light field: carriers times values times 12 (a 64-bit sum and
+/// its float). A photon map: what building it takes, for the photons that a short trace foretells.
+std::uint64_t predictedLightBytes(const FrameSetup& setup);
+
+/// @throws MemoryError (exit 5) naming numbers and remedies when smoke, stored light and frame
+///         would pass the budget
+void checkMemory(const FrameSetup& setup, bool storedLight);
 
 /// World from camera that looks at `target` from the front three-quarter, as near as keeps the
 /// whole box in the frame. The front is +Z where Y is up, -Y where Z is up.

@@ -34,6 +34,7 @@ struct FrameStatistics {
   double cpuSeconds = 0;
   std::uint64_t peakMemoryBytes = 0;
   std::uint64_t photonsEmitted = 0, photonsScattered = 0, photonsStored = 0, photonsCapped = 0;
+  std::uint64_t lightMemoryBytes = 0;  ///< light field or photon map, the largest of all passes
   /// Per channel [W].
   Vec3d energyEmitted{0.0}, energyMissed{0.0}, energyAbsorbed{0.0}, energyEscaped{0.0},
       energyCapped{0.0}, energyError{0.0};
@@ -55,9 +56,8 @@ struct FrameResult {
   Mat4d cameraFromWorld{1.0}, ndcFromWorld{1.0};
   double framesPerSecond = 24;
   std::string estimator;  ///< estimator.type
-  std::string
-      layout;  ///< one line: carrier, basis, bins, deposit, kernel; empty without light field
-  double radius = 0;  ///< of the spatial kernel [scene units]; 0 without light field
+  std::string layout;     ///< one line: how light is stored; empty where none is
+  double radius = 0;      ///< of the spatial kernel, of the first pass [scene units]; 0 without
   std::int64_t seed = 0;
   std::vector<std::string> notes;
 };

@@ -51,6 +51,7 @@ struct Collision {
 template <class Visit>
 inline void forEachTentative(const Medium& medium, const Vec3f& o, const Vec3f& d, float length,
                              Rng& rng, TrackingCounters& counters, const Visit& visit) {
+  const Medium::AlongRay extinction(medium, o, d);
   float tau = -fastLog(rng.uniformPositive());
   for (volume::MajorantGrid::Walk walk(medium.majorants(), o, d, 0.0f, length); !walk.done();
        walk.advance()) {
@@ -64,7 +65,7 @@ inline void forEachTentative(const Medium& medium, const Vec3f& o, const Vec3f& 
         break;
       }
       t += tau / majorant;
-      const float sigma = medium.extinction(o + d * t);
+      const float sigma = extinction(t);
       ++counters.lookups;
       if (sigma > majorant * 1.001f) ++counters.majorantViolations;
       if (!visit(t, sigma, majorant)) return;

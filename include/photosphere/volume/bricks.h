@@ -8,8 +8,10 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <type_traits>
 #include <vector>
 
+#include "photosphere/core/simd.h"
 #include "photosphere/core/types.h"
 #include "photosphere/volume/grid.h"
 
@@ -50,14 +52,7 @@ class BrickField {
     const float fx = p.x - static_cast<float>(x);
     const float fy = p.y - static_cast<float>(y);
     const float fz = p.z - static_cast<float>(z);
-    constexpr int dy = kNodes, dz = kNodes * kNodes;
-    const T c00 = n[0] + (n[1] - n[0]) * fx;
-    const T c10 = n[dy] + (n[dy + 1] - n[dy]) * fx;
-    const T c01 = n[dz] + (n[dz + 1] - n[dz]) * fx;
-    const T c11 = n[dz + dy] + (n[dz + dy + 1] - n[dz + dy]) * fx;
-    const T c0 = c00 + (c10 - c00) * fy;
-    const T c1 = c01 + (c11 - c01) * fy;
-    return c0 + (c1 - c0) * fz;
+    return interpolate(n, fx, fy, fz);
   }
 
   const Vec3i& origin() const { return m_origin; }
@@ -76,6 +71,28 @@ class BrickField {
   }
 
  private:
+  // Trilinear value in the cell whose lowest node is n[0].
+  static T interpolate(const T* n, float fx, float fy, float fz) {
+    constexpr int dy = kNodes, dz = kNodes * kNodes;
+    if constexpr (std::is_same_v<T, float>) {
+      // Two rows of two nodes a register, below and above.
+      const Float4 low = loadPairs(n, n + dy);
+      const Float4 face = low + (loadPairs(n + dz, n + dz + dy) - low) * fz;
+      const Float4 edge = face + (__builtin_shufflevector(face, face, 2, 3, 2, 3) - face) * fy;
+      return edge[0] + (edge[1] - edge[0]) * fx;
+    } else {
+      const auto at = [n](int i) { return load(&n[i].x); };
+      const Float4 c00 = at(0) + (at(1) - at(0)) * fx;
+      const Float4 c10 = at(dy) + (at(dy + 1) - at(dy)) * fx;
+      const Float4 c01 = at(dz) + (at(dz + 1) - at(dz)) * fx;
+      const Float4 c11 = at(dz + dy) + (at(dz + dy + 1) - at(dz + dy)) * fx;
+      const Float4 c0 = c00 + (c10 - c00) * fy;
+      const Float4 c1 = c01 + (c11 - c01) * fy;
+      const Float4 v = c0 + (c1 - c0) * fz;
+      return {v[0], v[1], v[2], v[3]};
+    }
+  }
+
   std::size_t tableIndex(int bx, int by, int bz) const {
     return (static_cast<std::size_t>(bz) * static_cast<std::size_t>(m_bricks.y) +
             static_cast<std::size_t>(by)) *

@@ -1,0 +1,74 @@
+#include "photon_map_stage.h"
+
+#include <algorithm>
+
+#include "light_stage.h"
+#include "photosphere/core/resources.h"
+
+namespace photosphere::scene {
+
+namespace {
+
+using estimators::PhotonMapLayout;
+
+// Radius that the ball of the nearest photons keeps to where none is given [density voxels].
+constexpr double kWidestBall = 8.0;
+
+std::uint32_t neighbors(const ParamValues& e) {
+  const std::int64_t nearest = e.integer("neighbors"), most = e.integer("max_photons");
+  const std::int64_t both = nearest > 0 && most > 0 ? std::min(nearest, most) : nearest + most;
+  return static_cast<std::uint32_t>(both);
+}
+
+// The whole progressive trace, of which pass i is the photons [i n, (i + 1) n).
+transport::TraceOptions traceOptions(const SceneFile& scene, const FrameSetup& setup, int pass) {
+  const auto each = static_cast<std::uint64_t>(scene.estimator.integer("photons"));
+  transport::TraceOptions options;
+  options.photons = each * static_cast<std::uint64_t>(setup.photonMap->passes);
+  options.firstPhoton = each * static_cast<std::uint64_t>(pass);
+  options.photonCount = each;
+  options.key = setup.key;
+  return options;
+}
+
+}  // namespace
+
+void planPhotonMap(const SceneFile& scene, FrameSetup& setup) {
+  const ParamValues& e = scene.estimator;
+  if (e.text("type") != "photon_map" || !storesLight(scene, setup)) return;
+  PhotonMapLayout& map = setup.photonMap.emplace();
+  map.kernel = setup.layout.kernel;
+  map.neighbors = neighbors(e);
+  map.passes = static_cast<int>(e.integer("passes"));
+  map.channels = setup.layout.channels;
+  map.unscattered = setup.layout.unscattered;
+  map.directionKernel = {setup.layout.angularKernel, setup.layout.bandwidth,
+                         setup.layout.truncation};
+  const estimators::PhotonForecast forecast = estimators::forecastPhotons(
+      *setup.medium, setup.lights, map.unscattered, traceOptions(scene, setup, 0));
+  setup.photonMapPhotons = forecast.photons;
+  map.radius = e.real("radius") * setup.space.metersPerUnit;
+  if (map.radius > 0) return;
+  // Where the nearest photons make the radius, the automatic one only keeps it from growing over
+  // empty space.
+  map.radius = e.integer("neighbors") > 0 ? kWidestBall * setup.medium->voxelEdge()
+                                          : estimators::automaticRadius(*setup.medium, forecast);
+}
+
+std::unique_ptr<estimators::PhotonMap> photonMapPass(const SceneFile& scene,
+                                                     const FrameSetup& setup, int pass,
+                                                     FrameStatistics& statistics) {
+  const Stopwatch watch;
+  PhotonMapLayout layout = *setup.photonMap;
+  layout.radius *= estimators::progressiveRadiusFactor(pass);
+  transport::TraceStatistics traced;
+  auto map = estimators::tracePhotonMap(*setup.medium, setup.lights, layout,
+                                        traceOptions(scene, setup, pass), traced);
+  addTraced(traced, statistics);
+  statistics.photonsStored += map->photons();
+  statistics.lightMemoryBytes = std::max(statistics.lightMemoryBytes, map->memoryBytes());
+  statistics.seconds.trace += watch.seconds();
+  return map;
+}
+
+}  // namespace photosphere::scene
