@@ -16,7 +16,8 @@ class FurnaceSource final : public estimators::InscatterSource {
  public:
   estimators::Inscatter at(const Vec3f&, const Vec3f&,
                            const transport::Coefficients& c) const override {
-    return {Rgb(0.0f), c.scattering[0]};
+    // However it is split: past the first bounce all of it is `multiple`.
+    return {0.25f * c.scattering[0], 0.75f * c.scattering[0]};
   }
   bool carriesUnscattered() const override { return true; }
 };

@@ -90,6 +90,37 @@ TEST(Emission, BirthsFollowTheInterpolatedEmission) {
   EXPECT_NEAR(statistic / terms, 1.0, 0.3);
 }
 
+// Four bins to a voxel along each axis: births follow the interpolant within voxels and across the
+// bricks' faces.
+TEST(Emission, BirthsAreExactWithinVoxels) {
+  const transport::Medium medium =
+      glowingMedium([](const Vec3d& p) { return Rgb(static_cast<float>(p.x + 0.5)); }, 0.5, 1.0);
+  constexpr int kBins = 64;
+  const int count = kSanitized ? 30'000 : 300'000;
+  std::vector<double> found[3];
+  for (std::vector<double>& axis : found)
+    axis.resize(kBins);
+  Rng rng(RandomKey::fromSeed(4, 0), RandomStream::test, 0);
+  for (int i = 0; i < count; ++i) {
+    const double u = rng.uniformDouble();
+    const Vec3f at =
+        medium.emission()->birth(u, Vec3f(rng.uniform(), rng.uniform(), rng.uniform())).origin;
+    for (int axis = 0; axis < 3; ++axis) {
+      const int bin = static_cast<int>((at[axis] + 0.5f) * static_cast<float>(kBins));
+      found[axis][static_cast<std::size_t>(glm::clamp(bin, 0, kBins - 1))] += 1;
+    }
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    double statistic = 0;
+    for (int k = 0; k < kBins; ++k) {
+      // Even along y and z; along x proportional to x, of which a bin holds (2k + 1) / kBins^2.
+      const double expected = count * (axis == 0 ? (2.0 * k + 1) / (kBins * kBins) : 1.0 / kBins);
+      statistic += std::pow(found[axis][static_cast<std::size_t>(k)] - expected, 2) / expected;
+    }
+    EXPECT_GT(chiSquaredTail(statistic, kBins - 1), 1e-3) << axis;
+  }
+}
+
 struct Tally final : transport::FlightSink {
   void consume(std::span<const transport::Flight> flights) override {
     for (const transport::Flight& f : flights)
