@@ -137,7 +137,10 @@ void writeReference(const fs::path& path, const ReferenceImage& reference, const
   attributes["comments"] = std::string(
       "Path-traced reference of photosphere study: mean (R, G, B, multiple, transmittance) and "
       "variance of that mean (variance, multiple_variance)");
-  image::writeExr(path, reference.pixels, attributes);
+  // What was read back and goes on has lost its channels' kinds; half would lose small variances.
+  image::ExrOptions options;
+  options.floatColor = true;
+  image::writeExr(path, reference.pixels, attributes, options);
 }
 
 std::optional<ReferenceImage> readReference(const fs::path& path, const std::string& key) {
