@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator_options.h"
 #include "light_stage.h"
 #include "photon_map_stage.h"
 #include "photosphere/core/error.h"
@@ -83,17 +84,17 @@ std::vector<std::string> presentLayers(const FrameSetup& setup) {
   return names;
 }
 
-std::string describe(const FrameSetup& setup) {
-  using namespace estimators;
-  const LightFieldLayout& l = setup.layout;
-  const std::string basis = l.basis == Basis::view
-                                ? "view"
-                                : fmt::format("histogram of {} bins ({} rows)", l.bins(), l.rows);
-  return fmt::format(
-      "{}, {}, {}, {} channel{}{}", l.carrier == Carrier::particles ? "particles" : "voxels", basis,
-      l.deposit == Deposit::collision ? "collision" : "track_length", l.channels,
-      l.channels == 1 ? "" : "s",
-      l.holdsPower() ? (l.energy == EnergyRule::scatter ? ", scatter" : ", gather") : "");
+// A basis that can go negative is clamped where it is read.
+void noteClamped(double share, FrameSetup& setup, FrameStatistics& statistics) {
+  statistics.clampedLight = share;
+  if (!(share > 0.001)) return;
+  setup.notes.push_back(fmt::format(
+      "{:.2g} of the stored light is below zero toward where it is read and counts as 0, a bias of "
+      "the basis beside sharp peaks; raise estimator.{}",
+      share,
+      setup.layout.basis == estimators::Basis::sphericalHarmonics
+          ? "order, or smooth with estimator.kernel"
+          : "rows"));
 }
 
 std::string describe(const estimators::PhotonMapLayout& map) {
@@ -112,12 +113,13 @@ std::unique_ptr<estimators::InscatterSource> prepareLight(const SceneFile& scene
     result.radius = setup.photonMap->radius / setup.space.metersPerUnit;
     return photonMapPass(scene, setup, pass, result.statistics);
   }
-  const estimators::LightField field = lightField(scene, request, setup, result.statistics);
-  result.layout = describe(setup);
+  estimators::LightField field = lightField(scene, request, setup, result.statistics);
+  result.layout = describeLayout(setup.layout);
   result.radius = setup.layout.radius / setup.space.metersPerUnit;
   const Stopwatch watch;
-  auto source = estimators::resolve(*setup.medium, field, setup.view);
+  auto source = estimators::resolve(*setup.medium, std::move(field), setup.view, setup.key);
   result.statistics.seconds.resolve = watch.seconds();
+  noteClamped(source->clampedShare(), setup, result.statistics);
   return source;
 }
 
@@ -151,7 +153,11 @@ class LayerRenderer {
     m_path.effects = m_march.effects = setup.effects;
     m_march.step = static_cast<float>(scene.render.real("step"));
     if (m_paths) return;
-    const auto mode = setup.effects.singleScattering && setup.effects.shadows
+    if (storesLight(scene, setup))
+      m_march.gatherRays = static_cast<int>(
+          (scene.estimator.integer("final_gather") + m_options.samples - 1) / m_options.samples);
+    const bool shadowed = setup.effects.singleScattering && setup.effects.shadows;
+    const auto mode = shadowed || m_march.gatherRays > 0
                           ? shadowMode(scene.render.text("shadow"))
                           : render::ShadowMode::march;  // tabulates nothing
     m_shadows.emplace(*setup.medium, setup.lights, mode,
@@ -275,7 +281,7 @@ FrameStatistics traceScene(const SceneFile& scene, std::int64_t frame, const std
   if (scene.estimator.text("basis") == "view")
     throw ConfigError(
         "estimator.basis = \"view\" holds light for one camera and cannot be cached; use "
-        "\"histogram\" or \"auto\"");
+        "\"histogram\", \"spherical_harmonics\" or \"auto\"");
   const Stopwatch total;
   const double cpuBefore = processCpuSeconds();
   SetupOptions options = setupOptions(request);

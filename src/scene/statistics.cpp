@@ -38,6 +38,7 @@ std::string statsJson(const FrameStatistics& s) {
   json["majorant_violations"] = s.majorantViolations;
   if (s.pathsCapped > 0)
     json["paths_capped"] = {{"count", s.pathsCapped}, {"throughput", s.pathsCappedRadiance}};
+  if (s.clampedLight > 0) json["clamped_light"] = s.clampedLight;
   json["effects"] = nlohmann::ordered_json::object();
   for (const EffectState& effect : s.effects)
     json["effects"][effect.name] = {{"on", effect.on}, {"why", effect.why}, {"bound", nullptr}};
