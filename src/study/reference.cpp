@@ -1,6 +1,7 @@
 #include "reference.h"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cctype>
@@ -27,6 +28,18 @@ constexpr const char* kKey = "photosphere:reference_key";
 
 // Seeds of chunks lie far from those that people choose for frames.
 constexpr std::int64_t kFirstSeed = 7'000'000'000;
+
+// A file that disappears with the object.
+struct Scratch {
+  explicit Scratch(fs::path file) : path(std::move(file)) {}
+  ~Scratch() {
+    std::error_code ignored;
+    fs::remove(path, ignored);
+  }
+  Scratch(const Scratch&) = delete;
+  Scratch& operator=(const Scratch&) = delete;
+  fs::path path;
+};
 
 Planes planesOf(const image::Image& image, const char* layer) {
   Planes planes;
@@ -137,7 +150,10 @@ void writeReference(const fs::path& path, const ReferenceImage& reference, const
   attributes["comments"] = std::string(
       "Path-traced reference of photosphere study: mean (R, G, B, multiple, transmittance) and "
       "variance of that mean (variance, multiple_variance)");
-  image::writeExr(path, reference.pixels, attributes);
+  // What was read back and goes on has lost its channels' kinds; half would lose small variances.
+  image::ExrOptions options;
+  options.floatColor = true;
+  image::writeExr(path, reference.pixels, attributes, options);
 }
 
 std::optional<ReferenceImage> readReference(const fs::path& path, const std::string& key) {
@@ -196,12 +212,12 @@ void ReferenceMaker::addPair() {
     job.scene.estimator.set("samples", static_cast<std::int64_t>(m_chunk), "reference");
     job.frame = m_frame;
     job.request.seed = kFirstSeed + 2 * static_cast<std::int64_t>(m_image.pairs) + half;
-    job.image = m_folder / fmt::format("chunk-{}-{}.exr", m_key, half);
+    // Two studies may share this folder.
+    const Scratch scratch(m_folder / fmt::format(".chunk-{}-{}.exr", m_key, getpid()));
+    job.image = scratch.path;
     const RenderOutcome outcome = renderInChild(job);
     if (outcome.failed) throw Error(outcome.code, "reference: " + outcome.message);
     halves[half] = image::readExr(job.image).image;
-    std::error_code ignored;
-    fs::remove(job.image, ignored);
   }
   study::addPair(m_image, halves[0], halves[1], static_cast<std::uint64_t>(m_chunk));
   writeReference(m_file, m_image, m_key);

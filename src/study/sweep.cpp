@@ -22,6 +22,8 @@ namespace {
 constexpr double kNoiseShare = 0.1;
 /// Work of a level over that of the one before it.
 constexpr double kLevelGrowth = 4;
+/// Part of the budget that one contender may take, where the budget is worth sharing [s].
+constexpr double kLargestShare = 0.25, kShortBudget = 30;
 constexpr std::uint64_t kProgressParts = 1000;
 
 std::array<Planes, 2> layersOf(const image::Image& image) {
@@ -120,6 +122,16 @@ double Sweep::secondsOfRound() const {
   return sum;
 }
 
+// The least work of a family cannot be foretold: one that alone would take much of the budget goes.
+void Sweep::tryOut(Entry& entry) {
+  run(entry, 0);
+  if (entry.dropped || m_plan.measureSeconds < kShortBudget) return;
+  const double all = entry.runs[0].seconds.total * m_plan.seeds;
+  if (all > kLargestShare * m_plan.measureSeconds)
+    leaveOut(entry, fmt::format("its {} runs would take {:.3g} s of the {:.3g} s for all",
+                                m_plan.seeds, all, m_plan.measureSeconds));
+}
+
 void Sweep::measureFirst(const Stopwatch& watch) {
   Progress progress(m_plan.name + ": try", m_entries.size());
   for (Entry& entry : m_entries) {
@@ -133,7 +145,7 @@ void Sweep::measureFirst(const Stopwatch& watch) {
       leaveOut(entry, fmt::format("its {} runs of about {:.3g} s would pass the time budget",
                                   m_plan.seeds, predicted));
     else
-      run(entry, 0);
+      tryOut(entry);
     progress.add(1);
   }
 }

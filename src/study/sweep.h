@@ -51,6 +51,7 @@ class Sweep {
   };
 
   void measureFirst(const Stopwatch& watch);
+  void tryOut(Entry& entry);
   bool affordable(const Entry& entry, double elapsed, double& predicted) const;
   double secondsOfRound() const;
   void run(Entry& entry, int seed);

@@ -177,6 +177,10 @@ TEST_F(Study, RefusesWhatItCannotStudy) {
   EXPECT_NE(family.err.find("did you mean 'view'"), std::string::npos) << family.err;
   EXPECT_EQ(study({"-s", "volume.0.file=missing.vdb"}).exitCode, 3);
   EXPECT_EQ(study({"-s", "camera.fof=1"}).exitCode, 2);
+  EXPECT_EQ(study({"--paper"}).exitCode, 2);
+  const RunResult nothing = runTool({"study", "-o", "report"}, m_folder.path());
+  EXPECT_EQ(nothing.exitCode, 2);
+  EXPECT_NE(nothing.err.find("SCENE"), std::string::npos) << nothing.err;
   const RunResult bare =
       runShell("PATH= '" PHOTOSPHERE_TOOL "' study x.toml -o r", m_folder.path());
   EXPECT_EQ(bare.exitCode, 2);

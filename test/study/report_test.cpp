@@ -8,8 +8,10 @@
 #include "gnuplot.h"
 #include "hard_cases.h"
 #include "html.h"
+#include "paper_exhibits.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/resources.h"
+#include "photosphere/study/paper.h"
 #include "photosphere/study/study.h"
 #include "plots.h"
 #include "support/support.h"
@@ -138,6 +140,33 @@ TEST(Child, memoryIsItsOwn) {
                       after = peakAfter(1);
   EXPECT_GT(large, before + (std::size_t{60} << 20));
   EXPECT_LT(after, before + (std::size_t{8} << 20));
+}
+
+// The paper's numbers, and ratios over the first line of each exhibit.
+TEST(PaperExhibits, compareWithThePapersOwnRatios) {
+  const auto plans = paperExhibits(200'000);
+  const auto plan = [&](const std::string& name) {
+    for (const ExhibitPlan& p : plans)
+      if (p.name == name) return p;
+    ADD_FAILURE() << name;
+    return ExhibitPlan();
+  };
+  for (const char* name : {"Figure 11", "Figure 12", "Figure 13", "Figure 14", "Figure 15",
+                           "Figure 16", "Table 1", "Table 2", "Memory (section 4.1.3)"})
+    EXPECT_GE(plan(name).frames.size(), 2u) << name;
+  PaperExhibit table;
+  table.unit = "s";
+  for (const PaperFrame& frame : plan("Table 2").frames) {
+    PaperRow row;
+    row.paperValue = frame.paperValue;
+    row.measured = true;
+    row.seconds.median = table.rows.empty() ? 4 : 3;
+    table.rows.push_back(row);
+  }
+  EXPECT_NEAR(papersRatio(table, table.rows[1]), 495.75 / 835.5, 1e-12);
+  EXPECT_NEAR(ourRatio(table, table.rows[1]), 0.75, 1e-12);
+  table.rows[1].measured = false;
+  EXPECT_EQ(ourRatio(table, table.rows[1]), 0);
 }
 
 TEST(Resolution, isBroughtDownToTheLargestEdge) {
