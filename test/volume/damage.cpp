@@ -44,10 +44,11 @@ struct Outcome {
   int read = 0, refused = 0, crashed = 0;
 };
 
-// The address sanitizer ends the program where `new` would throw, which readVdb makes a refusal.
-bool askedForTooMuch(const std::string& report) {
-  return report.find("allocation-size-too-big") != std::string::npos ||
-         report.find("AddressSanitizer: out-of-memory") != std::string::npos;
+// A flipped sign in a length makes OpenVDB 10 read a stored array of any length into the buffer of
+// another (io/Compression.cc, bloscFromStream). Not ours to mend; `probeVdb` keeps it in a process
+// of its own.
+bool isOpenVdbOverrun(const std::string& report) {
+  return report.find("bloscFromStream") != std::string::npos;
 }
 
 // Reads in a process of its own and says how it ended. 4 stands for the guard's exit.
@@ -78,8 +79,8 @@ void readDamaged(const fs::path& path, const std::string& what, Outcome& outcome
   int code = WEXITSTATUS(status);
   if (code == test::kSanitizerExit) {
     const std::string text = test::readText(report);
-    EXPECT_TRUE(askedForTooMuch(text)) << what << ":\n" << text;
-    code = 10;
+    EXPECT_TRUE(isOpenVdbOverrun(text)) << what << ":\n" << text;
+    code = 4;
   }
   EXPECT_TRUE(code == 0 || code == 4 || code == 10) << what << ": exit " << code;
   ++(code == 0 ? outcome.read : code == 4 ? outcome.crashed : outcome.refused);
