@@ -135,7 +135,7 @@ std::vector<ColumnGroup> groupColumns(const std::vector<std::string>& names) {
   for (ColumnGroup& group : groups) {
     const bool first = taken[group.name]++ == 0;
     if (first && (group.name != "P" || group.columns.size() == 3)) continue;
-    const std::string own = names[group.columns.front()];
+    const std::string& own = names[group.columns.front()];
     group.name = own;
     for (int n = 2; taken.count(group.name) > 0; ++n)
       group.name = fmt::format("{}_{}", own, n);

@@ -42,9 +42,8 @@ void appendGrid(std::string& text, const GridReport& grid) {
         "rays 5 % {:.3g}, 50 % {:.3g}, 95 % {:.3g}\n",
         depth.meanFreePathVoxels, depth.p5, depth.median, depth.p95);
     text += fmt::format(
-        "    density_scale = {:.2g} makes it look like smoke (95 % of rays below optical "
-        "depth {:.2g})\n",
-        depth.suggestedScale, volume::kSmokeOpticalDepth);
+        "    density_scale = {:.2g} makes it look like smoke (median optical depth {:.2g})\n",
+        depth.suggestedScale, volume::kSmokeDepth);
   }
   if (grid.velocityVoxelsPerFrame)
     text += fmt::format("    at 24 frames a second the fastest voxel moves {:.3g} voxels a frame\n",

@@ -74,7 +74,8 @@ void readMetadata(std::string_view chunks, CacheContent& content) {
     const std::string name(chunk.substr(first + 1, second - first - 1));
     const auto type = decode<std::int32_t>(chunk.data() + second + 1, kLittle);
     const std::string text = valuesText(chunk.substr(second + 5), type);
-    if (!text.empty()) content.metadata[channel.empty() ? name : channel + "." + name] = text;
+    if (!text.empty())
+      content.metadata[channel.empty() ? name : fmt::format("{}.{}", channel, name)] = text;
   }
 }
 

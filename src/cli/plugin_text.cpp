@@ -61,12 +61,19 @@ std::string describeCameras() {
 
 std::string describeEstimators() {
   // The types and their options are one table of rows: `type` names those that there are.
-  return describeRows("[estimator]", scene::estimatorParams());
+  std::string text = describeRows("[estimator]", scene::estimatorParams());
+  for (const scene::Preset& preset : scene::estimatorPresets()) {
+    text += fmt::format("  preset = \"{}\": {}\n", preset.name, preset.help);
+    for (const scene::PresetValue& value : preset.values)
+      text += fmt::format("{:{}}{} = {}\n", "", kIndent, value.key, value.value);
+  }
+  return text;
 }
 
 std::string describeScene() {
   return describeRows("[scene]", scene::sceneParams()) +
          describeRows("[[volume]]", scene::volumeParams()) +
+         describeRows("emission of a [[volume]]", scene::emissionParams()) +
          describeRows("[effects]", scene::effectsParams()) +
          describeRows("[render]", scene::renderParams()) +
          describeRows("[output]", scene::outputParams());

@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 
 #include <charconv>
+#include <cmath>
 #include <map>
 
 #include "photosphere/core/error.h"
 #include "photosphere/core/version.h"
+#include "photosphere/sphere/spherical_harmonics.h"
 #include "photosphere/volume/vdb_file.h"
 
 namespace photosphere::estimators {
@@ -26,6 +28,9 @@ struct Named {
 };
 constexpr Named<Carrier> kCarriers[] = {{Carrier::voxels, "voxels"},
                                         {Carrier::particles, "particles"}};
+// The view basis belongs to one camera and has no cache.
+constexpr Named<Basis> kBases[] = {{Basis::histogram, "histogram"},
+                                   {Basis::sphericalHarmonics, "spherical_harmonics"}};
 constexpr Named<Deposit> kDeposits[] = {{Deposit::trackLength, "track_length"},
                                         {Deposit::collision, "collision"}};
 constexpr Named<EnergyRule> kEnergies[] = {{EnergyRule::gather, "gather"},
@@ -33,6 +38,17 @@ constexpr Named<EnergyRule> kEnergies[] = {{EnergyRule::gather, "gather"},
 constexpr Named<SpatialKernel> kKernels[] = {{SpatialKernel::epanechnikov, "epanechnikov"},
                                              {SpatialKernel::box, "box"},
                                              {SpatialKernel::gaussian, "gaussian"}};
+
+constexpr Named<sphere::DirectionDeposit> kDirections[] = {
+    {sphere::DirectionDeposit::nearest, "nearest"},
+    {sphere::DirectionDeposit::barycentric, "barycentric"},
+    {sphere::DirectionDeposit::kernel, "kernel"}};
+constexpr Named<Representative> kRepresentatives[] = {{Representative::bin, "bin"},
+                                                      {Representative::mean, "mean"}};
+constexpr Named<sphere::AngularKernel> kAngularKernels[] = {
+    {sphere::AngularKernel::none, "none"},
+    {sphere::AngularKernel::epanechnikov, "epanechnikov"},
+    {sphere::AngularKernel::gaussian, "gaussian"}};
 
 template <class E, std::size_t N>
 const char* nameOf(const Named<E> (&table)[N], E value) {
@@ -55,6 +71,7 @@ class Reader {
   Reader(std::string path, Metadata metadata)
       : m_path(std::move(path)), m_metadata(std::move(metadata)) {}
 
+  bool has(const std::string& key) const { return m_metadata.count(key) != 0; }
   const std::string& text(const std::string& key) const {
     const auto found = m_metadata.find(key);
     if (found == m_metadata.end())
@@ -108,11 +125,19 @@ Metadata describe(const LightField& field, const LightCacheKey& key) {
   m["photosphere_version"] = versionText();
   m["quantity"] = l.holdsPower() ? "power [W]" : "fluence rate [W m^-2]";
   m["carrier"] = nameOf(kCarriers, l.carrier);
-  m["basis"] = "histogram";
+  m["basis"] = nameOf(kBases, l.basis);
+  if (l.basis == Basis::sphericalHarmonics) m["order"] = std::to_string(l.order);
   m["deposit"] = nameOf(kDeposits, l.deposit);
   m["energy"] = nameOf(kEnergies, l.energy);
   m["spatial_kernel"] = nameOf(kKernels, l.kernel);
   m["rows"] = std::to_string(l.rows);
+  m["direction"] = nameOf(kDirections, l.direction);
+  m["representative"] = nameOf(kRepresentatives, l.representative);
+  if (l.direction == sphere::DirectionDeposit::kernel) {
+    m["kernel"] = nameOf(kAngularKernels, l.angularKernel);
+    m["bandwidth"] = exact(l.bandwidth);
+    m["truncation"] = exact(l.truncation);
+  }
   m["channels"] = std::to_string(l.channels);
   m["phases"] = std::to_string(l.phases);
   m["unscattered"] = std::string(1, l.unscattered ? '1' : '0');
@@ -134,28 +159,42 @@ Metadata describe(const LightField& field, const LightCacheKey& key) {
   return m;
 }
 
-// One set of values as a strided attribute, and its sum over bins.
+// Attribute of the values themselves.
+std::string valuesName(const LightFieldLayout& layout) {
+  return layout.basis == Basis::histogram ? "photon_histogram" : "photon_harmonics";
+}
+
+// One set of values as strided attributes: bins, their sum, and mean directions where they are
+// kept.
 void addSet(volume::ParticleSet& points, const LightField& field, std::size_t set,
             const std::string& suffix) {
   const LightFieldLayout& l = field.layout;
   const auto stride = static_cast<std::size_t>(l.valuesPerCarrier());
   const auto size = static_cast<std::size_t>(l.setSize());
+  const auto light = static_cast<std::size_t>(l.bins() * l.channels);
   const auto channels = static_cast<std::size_t>(l.channels);
-  std::vector<float> histogram, energy;
-  histogram.reserve(field.carriers() * size);
+  std::vector<float> histogram, energy, directions;
+  histogram.reserve(field.carriers() * light);
   energy.reserve(field.carriers() * channels);
+  directions.reserve(field.carriers() * (size - light));
   for (std::size_t i = 0; i < field.carriers(); ++i) {
     const float* values = field.values.data() + i * stride + set * size;
-    histogram.insert(histogram.end(), values, values + size);
+    histogram.insert(histogram.end(), values, values + light);
+    directions.insert(directions.end(), values + light, values + size);
     for (std::size_t c = 0; c < channels; ++c) {
       double sum = 0;
-      for (std::size_t j = c; j < size; j += channels)
-        sum += static_cast<double>(values[j]);
+      if (l.basis == Basis::histogram)
+        for (std::size_t j = c; j < light; j += channels)
+          sum += static_cast<double>(values[j]);
+      else  // the first harmonic is 1 / sqrt(4 pi) everywhere
+        sum = std::sqrt(4 * kPi) * static_cast<double>(values[c]);
       energy.push_back(static_cast<float>(sum));
     }
   }
-  points.add({fmt::format("photon_histogram{}", suffix), l.setSize(), std::move(histogram)});
+  points.add({valuesName(l) + suffix, static_cast<int>(light), std::move(histogram)});
   points.add({fmt::format("photon_energy{}", suffix), l.channels, std::move(energy)});
+  if (l.keepsMeans())
+    points.add({fmt::format("photon_direction{}", suffix), 3 * l.bins(), std::move(directions)});
 }
 
 const std::vector<float>& floats(const volume::ParticleSet& points, const std::string& name,
@@ -172,10 +211,10 @@ const std::vector<float>& floats(const volume::ParticleSet& points, const std::s
 
 void writeLightCache(const std::filesystem::path& path, const LightField& field,
                      const LightCacheKey& key) {
-  if (field.layout.basis != Basis::histogram)
+  if (field.layout.basis == Basis::view)
     throw ConfigError(
-        "a light cache holds a histogram: the view basis belongs to one camera; set "
-        "estimator.basis = \"histogram\" or \"auto\"");
+        "a light cache serves every camera, and the view basis belongs to one; set "
+        "estimator.basis = \"histogram\", \"spherical_harmonics\" or \"auto\"");
   volume::ParticleSet points;
   const bool voxels = field.layout.carrier == Carrier::voxels;
   points.positions.reserve(field.carriers());
@@ -226,11 +265,24 @@ LightField readLightCache(const std::filesystem::path& path, const LightCacheKey
   LightField field;
   LightFieldLayout& l = field.layout;
   l.carrier = m.choice("carrier", kCarriers);
-  l.basis = Basis::histogram;
+  l.basis = m.choice("basis", kBases);
+  if (l.basis == Basis::sphericalHarmonics)
+    l.order = m.whole("order", 0, sphere::SphericalHarmonics::kMaxOrder);
   l.deposit = m.choice("deposit", kDeposits);
   l.energy = m.choice("energy", kEnergies);
   l.kernel = m.choice("spatial_kernel", kKernels);
   l.rows = m.whole("rows", 1, 64);
+  // Caches written before these choices existed hold their defaults.
+  if (m.has("direction")) l.direction = m.choice("direction", kDirections);
+  if (m.has("representative")) l.representative = m.choice("representative", kRepresentatives);
+  if (l.direction == sphere::DirectionDeposit::kernel) {
+    l.angularKernel = m.choice("kernel", kAngularKernels);
+    l.bandwidth = m.number("bandwidth");
+    l.truncation = m.number("truncation");
+    if (!(l.bandwidth >= 1e-4 && l.bandwidth <= 1e4)) m.bad("bandwidth");
+    if (!(l.truncation > 0)) m.bad("truncation");
+    if (l.angularKernel == sphere::AngularKernel::none) m.bad("kernel");
+  }
   l.channels = m.whole("channels", 1, 3);
   if (l.channels == 2) m.bad("channels");
   l.phases = m.whole("phases", 1, transport::kMaxPhases);
@@ -258,16 +310,19 @@ LightField readLightCache(const std::filesystem::path& path, const LightCacheKey
   }
 
   const auto size = static_cast<std::size_t>(l.setSize());
+  const auto light = static_cast<std::size_t>(l.bins() * l.channels);
   const auto stride = static_cast<std::size_t>(l.valuesPerCarrier());
   field.values.resize(count * stride);
-  for (std::size_t set = 0; set < (l.unscattered ? 2u : 1u); ++set) {
-    const auto& histogram =
-        floats(points, set ? "photon_histogram_unscattered" : "photon_histogram", count * size,
-               path.string());
+  const auto place = [&](const std::string& name, std::size_t width, std::size_t offset) {
+    const auto& from = floats(points, name, count * width, path.string());
     for (std::size_t i = 0; i < count; ++i)
-      std::copy_n(
-          histogram.data() + i * size, size,
-          field.values.data() + static_cast<std::size_t>((*order)[i]) * stride + set * size);
+      std::copy_n(from.data() + i * width, width,
+                  field.values.data() + static_cast<std::size_t>((*order)[i]) * stride + offset);
+  };
+  for (std::size_t set = 0; set < (l.unscattered ? 2u : 1u); ++set) {
+    const std::string suffix = set ? "_unscattered" : "";
+    place(valuesName(l) + suffix, light, set * size);
+    if (l.keepsMeans()) place("photon_direction" + suffix, size - light, set * size + light);
   }
   if (l.carrier == Carrier::particles) {
     const auto& local = floats(points, "light_local", count * 3, path.string());

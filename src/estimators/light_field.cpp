@@ -21,14 +21,6 @@ namespace {
 // column, 2026-11-22: half of it is noisier, twice as much is darker at the smoke's edge.
 constexpr double kWantedCrossings = 2000.0;
 
-double totalPower(const Medium& medium, const transport::LightList& lights) {
-  const lights::BoundingSphere bounds = transport::boundingSphere(medium);
-  double power = 0;
-  for (const auto& light : lights)
-    power += std::max(0.0, maxComponent(Vec3d(light->power(bounds))));
-  return power;
-}
-
 void checkSums(const FixedSums& sums) {
   if (sums.overflows > 0)
     throw Error(
@@ -60,11 +52,12 @@ void traceVoxels(const Medium& medium, const transport::LightList& lights, const
   FixedSums sums;
   sums.sums.assign(field.lattice.size() * static_cast<std::size_t>(field.layout.valuesPerCarrier()),
                    0);
-  // The quantum is fixed by the scene (METHOD.md section 6): lamp power times the smoke's diameter.
-  const double power = totalPower(medium, lights);
+  // The quantum is fixed by the scene (METHOD.md section 6): its power times the smoke's diameter.
+  const double power = transport::sharedPower(medium, lights);
   const double diameter = 2.0 * transport::boundingSphere(medium).radius;
   sums.quantum = power > 0 && diameter > 0 ? power * diameter * 0x1p-24 : 1.0;
-  VoxelSink sink(medium, lights, field.layout, view, field.lattice, options.key, sums);
+  VoxelSink sink(CarrierSums(medium, lights, field.layout, view, options.key, sums),
+                 field.layout.deposit, field.lattice);
   statistics = transport::tracePhotons(medium, lights, options, sink);
   checkSums(sums);
   const double volume = edge * edge * edge;
@@ -78,10 +71,11 @@ void traceCollisionsOnParticles(const Medium& medium, const transport::LightList
   FixedSums sums;
   sums.sums.assign(
       field.particles.size() * static_cast<std::size_t>(field.layout.valuesPerCarrier()), 0);
-  const double power = totalPower(medium, lights);
+  const double power = transport::sharedPower(medium, lights);
   sums.quantum = power > 0 ? power * 0x1p-24 : 1.0;
   const ParticleIndex index(field.particles, field.layout.depositRadius);
-  ParticleSink sink(medium, lights, field.layout, view, field.particles, index, options.key, sums);
+  ParticleSink sink(CarrierSums(medium, lights, field.layout, view, options.key, sums),
+                    field.layout, field.particles, index);
   statistics = transport::tracePhotons(medium, lights, options, sink);
   checkSums(sums);
   field.farPhotons = sink.farPhotons();
@@ -111,6 +105,7 @@ LightField traceLightField(const Medium& medium, const transport::LightList& lig
                            const std::vector<Vec3f>& particles,
                            const transport::TraceOptions& options,
                            transport::TraceStatistics& statistics) {
+  checkLayout(layout);
   LightField field;
   field.layout = layout;
   field.photons = options.photons;

@@ -67,14 +67,6 @@ const std::array<NamedChromaticities, 19> kKnownSpaces{{
     {"utility - linear - p3-d65", kP3D65},
 }};
 
-std::optional<Chromaticities> knownChromaticities(std::string name) {
-  std::transform(name.begin(), name.end(), name.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  for (const NamedChromaticities& known : kKnownSpaces)
-    if (known.name == name) return known.value;
-  return std::nullopt;
-}
-
 /// At most this many names in a message: studio configs have hundreds.
 constexpr std::size_t kMostNames = 40;
 
@@ -93,6 +85,14 @@ ColorConverter makeConverter(const OCIO::ConstProcessorRcPtr& processor) {
 }
 
 }  // namespace
+
+std::optional<Chromaticities> knownChromaticities(std::string name) {
+  std::transform(name.begin(), name.end(), name.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  for (const NamedChromaticities& known : kKnownSpaces)
+    if (known.name == name) return known.value;
+  return std::nullopt;
+}
 
 Rgb ColorConverter::operator()(const Rgb& color) const {
   Rgb result = color;

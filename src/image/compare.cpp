@@ -8,6 +8,22 @@
 namespace photosphere::image {
 namespace {
 
+/// What `Z` holds where a pixel met nothing (render::kNoDepth).
+constexpr float kFarDepth = 1e10f;
+
+bool isDepth(const std::string& channel) {
+  return channel == "Z" || channel.ends_with(".Z");
+}
+
+/// 0 where both depths are those of nothing: that they agree there says nothing of the others, and
+/// their size would drown them in every mean.
+std::vector<unsigned char> depthMask(std::span<const float> a, std::span<const float> b) {
+  std::vector<unsigned char> mask(a.size());
+  for (std::size_t i = 0; i < a.size(); ++i)
+    mask[i] = !(a[i] >= kFarDepth && b[i] >= kFarDepth);
+  return mask;
+}
+
 std::string describe(const Window& w) {
   return fmt::format("{}x{} at ({}, {})", w.width, w.height, w.x, w.y);
 }
@@ -72,6 +88,11 @@ class Comparer {
     if (variance.size() == layer.channels.size())
       for (const auto& plane : variance)
         options.referenceVariance.emplace_back(plane);
+    std::vector<unsigned char> met;
+    if (image.size() == 1 && isDepth(m_reference.channels()[layer.channels[0]].name)) {
+      met = depthMask(image[0], reference[0]);
+      options.mask = met;
+    }
     LayerComparison result;
     result.layer = layer.name;
     result.all = measure(image, reference, m_image.width(), origin(), options);

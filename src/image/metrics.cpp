@@ -107,6 +107,27 @@ ErrorMetrics measure(const Planes& image, const Planes& reference, int width, Ve
   return metrics;
 }
 
+double relativeProduct(const Planes& a, const Planes& b, const Planes& reference,
+                       std::span<const unsigned char> mask) {
+  MeasureOptions options;
+  options.mask = mask;
+  checkSizes(a, reference, options);
+  checkSizes(b, reference, options);
+  ErrorMetrics ignored;
+  std::vector<std::size_t> pixels = selectPixels(a, reference, options, ignored);
+  std::erase_if(pixels, [&](std::size_t i) { return !allFinite(b, i); });
+  if (pixels.empty()) return 0;
+  const double floor = 0.1 * meanOf(reference, pixels);
+  double sum = 0;
+  for (const std::size_t i : pixels)
+    for (std::size_t c = 0; c < reference.size(); ++c) {
+      const double ref = reference[c][i];
+      const double product = (a[c][i] - ref) * (b[c][i] - ref);
+      if (product != 0) sum += product / (ref * ref + floor * floor);
+    }
+  return sum / (static_cast<double>(pixels.size()) * static_cast<double>(reference.size()));
+}
+
 std::vector<float> varianceOfMean(std::span<const float> a, std::span<const float> b) {
   if (a.size() != b.size()) throw ConfigError("two halves of a reference differ in size");
   std::vector<float> variance(a.size());

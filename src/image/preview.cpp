@@ -56,7 +56,7 @@ std::vector<float> displayPixels(const Image& image, const ColorConfig& config,
 }
 
 std::string encode(const std::string& path, const std::string& format, const Window& window,
-                   const std::vector<float>& pixels, const DisplayOptions& options) {
+                   std::span<const float> pixels, const DisplayOptions& options) {
   const auto failed = [&](const std::string& why) {
     return OutputError(path, "cannot encode this preview: " + why);
   };
@@ -75,6 +75,19 @@ std::string encode(const std::string& path, const std::string& format, const Win
 }
 
 }  // namespace
+
+std::string encodePreview(const Image& image, const ColorConfig& config,
+                          const DisplayOptions& options) {
+  const std::vector<float> pixels = displayPixels(image, config, options);
+  return encode("preview.png", "png", image.displayWindow(), pixels, options);
+}
+
+std::string encodePng(int width, int height, std::span<const float> rgb) {
+  if (width < 1 || height < 1 ||
+      rgb.size() != 3 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height))
+    throw ConfigError("a picture to encode has another size than its pixels");
+  return encode("picture.png", "png", {0, 0, width, height}, rgb, {});
+}
 
 void writePreview(const std::filesystem::path& path, const Image& image, const ColorConfig& config,
                   const DisplayOptions& options) {

@@ -32,19 +32,4 @@ Vec3d directionFromValues(const ParamValues& values, std::string_view light) {
   return d / length;
 }
 
-Illumination illuminateFromPoint(const Vec3d& position, const Rgb& intensity, const Vec3f& point,
-                                 Vec3d& direction) {
-  const Vec3d d = Vec3d(point) - position;
-  const double distance = glm::length(d);
-  direction = distance > 0 ? d / distance : Vec3d(0, 0, 1);
-  Illumination result;
-  result.direction = Vec3f(direction);
-  result.distance = static_cast<float>(distance);
-  if (distance > 0) {
-    const double clamped = glm::max(distance, glm::max(1e-9, 1e-7 * glm::length(position)));
-    result.irradiance = intensity * static_cast<float>(1 / (clamped * clamped));
-  }
-  return result;
-}
-
 }  // namespace photosphere::lights

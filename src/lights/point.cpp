@@ -9,32 +9,31 @@ namespace {
 
 class PointLight final : public Light {
  public:
-  PointLight(const Vec3d& position, const Rgb& intensity)
-      : m_position(position), m_intensity(intensity) {}
+  PointLight(const Vec3d& position, const Rgb& intensity) : m_source(position, intensity) {}
 
   Rgb power(const BoundingSphere& bounds) const override {
-    return m_intensity * static_cast<float>(coneToward(m_position, bounds).solidAngle());
+    return m_source.intensity() *
+           static_cast<float>(coneToward(m_source.position(), bounds).solidAngle());
   }
 
   Emission emit(const BoundingSphere& bounds, const Vec4f& u) const override {
-    const Cone cone = coneToward(m_position, bounds);
+    const Cone cone = coneToward(m_source.position(), bounds);
     const Vec3d direction =
         directionInCone(cone.axis, static_cast<double>(u.x) * cone.oneMinusCos, u.y);
-    return {photonOrigin(m_position, direction, bounds), Vec3f(direction),
-            m_intensity * static_cast<float>(cone.solidAngle())};
+    return {photonOrigin(m_source.position(), direction, bounds), Vec3f(direction),
+            m_source.intensity() * static_cast<float>(cone.solidAngle())};
   }
 
   Illumination illuminate(const Vec3f& point, const Vec2f&) const override {
     Vec3d direction;
-    return illuminateFromPoint(m_position, m_intensity, point, direction);
+    return m_source.illuminate(point, direction);
   }
 
   bool isDelta() const override { return true; }
-  bool isGrey() const override { return isGreyColor(m_intensity); }
+  bool isGrey() const override { return isGreyColor(m_source.intensity()); }
 
  private:
-  Vec3d m_position;  // local space [m]
-  Rgb m_intensity;   // [W/sr]
+  PointSource m_source;
 };
 
 constexpr Param params[] = {

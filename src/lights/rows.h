@@ -1,6 +1,8 @@
 #pragma once
 // Option rows that several lights share, and what they share in reading them.
 
+#include <cmath>
+
 #include "photosphere/lights/light.h"
 
 namespace photosphere::lights {
@@ -61,11 +63,46 @@ inline bool isGreyColor(const Rgb& c) {
 /// Unit vector from `position` to `target`. @throws ConfigError when they coincide
 Vec3d directionFromValues(const ParamValues& values, std::string_view light);
 
-/// Illumination by a source of `intensity` [W/sr] at `position`: I / d^2. The square grows no more
-/// once d falls below the rounding of a float position there (1e-7 of its length, at least 1e-9 m);
-/// at the source itself no direction is known and the irradiance is 0.
-/// @param[out] direction  the unit propagation direction in double
-Illumination illuminateFromPoint(const Vec3d& position, const Rgb& intensity, const Vec3f& point,
-                                 Vec3d& direction);
+/// A source of light at one point, ready to be asked often.
+class PointSource {
+ public:
+  /// @param position   local space [m]
+  /// @param intensity  [W/sr]
+  PointSource(const Vec3d& position, const Rgb& intensity)
+      : m_position(position),
+        m_intensity(intensity),
+        m_largestInverse(1 / glm::max(1e-9, 1e-7 * glm::length(position))) {}
+
+  const Vec3d& position() const { return m_position; }
+  const Rgb& intensity() const { return m_intensity; }
+
+  /// I / d^2. The square grows no more once d falls below the rounding of a float position there
+  /// (1e-7 of its length, at least 1e-9 m); at the source itself no direction is known and the
+  /// irradiance is 0.
+  /// @param[out] direction  the unit propagation direction in double
+  Illumination illuminate(const Vec3f& point, Vec3d& direction) const {
+    const Vec3d d = Vec3d(point) - m_position;
+    const double squared = glm::dot(d, d);
+    Illumination result;
+    if (!(squared > 0)) {
+      direction = Vec3d(0, 0, 1);
+      result.direction = Vec3f(direction);
+      result.distance = 0.0f;
+      return result;
+    }
+    const double inverse = 1 / std::sqrt(squared);
+    direction = d * inverse;
+    result.direction = Vec3f(direction);
+    result.distance = static_cast<float>(squared * inverse);
+    const double clamped = glm::min(inverse, m_largestInverse);
+    result.irradiance = m_intensity * static_cast<float>(clamped * clamped);
+    return result;
+  }
+
+ private:
+  Vec3d m_position;
+  Rgb m_intensity;
+  double m_largestInverse;  // of the distance, where I / d^2 stops growing [1/m]
+};
 
 }  // namespace photosphere::lights

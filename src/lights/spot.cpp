@@ -90,17 +90,17 @@ double sharedSolidAngle(const Falloff& falloff, const Vec3d& axis, const Cone& c
 class SpotLight final : public Light {
  public:
   SpotLight(const Vec3d& position, const Vec3d& axis, const Rgb& intensity, const Falloff& falloff)
-      : m_position(position), m_axis(axis), m_intensity(intensity), m_falloff(falloff) {}
+      : m_source(position, intensity), m_axis(axis), m_falloff(falloff) {}
 
   Rgb power(const BoundingSphere& bounds) const override {
-    return m_intensity *
-           static_cast<float>(sharedSolidAngle(m_falloff, m_axis, coneToward(m_position, bounds)));
+    return m_source.intensity() * static_cast<float>(sharedSolidAngle(
+                                      m_falloff, m_axis, coneToward(m_source.position(), bounds)));
   }
 
   /// Draws from the smaller of the spot's cone and the sphere's; what falls outside the other has
   /// no power.
   Emission emit(const BoundingSphere& bounds, const Vec4f& u) const override {
-    const Cone toSmoke = coneToward(m_position, bounds);
+    const Cone toSmoke = coneToward(m_source.position(), bounds);
     const bool fromSpot = m_falloff.outer() < toSmoke.oneMinusCos;
     const Cone cone = fromSpot ? Cone{m_axis, m_falloff.outer()} : toSmoke;
     const double h = static_cast<double>(u.x) * cone.oneMinusCos;
@@ -109,24 +109,23 @@ class SpotLight final : public Light {
     if (fromSpot && oneMinusCosBetween(direction, toSmoke.axis) > toSmoke.oneMinusCos &&
         toSmoke.oneMinusCos < 2.0)
       weight = 0;
-    return {photonOrigin(m_position, direction, bounds), Vec3f(direction),
-            m_intensity * static_cast<float>(weight * cone.solidAngle())};
+    return {photonOrigin(m_source.position(), direction, bounds), Vec3f(direction),
+            m_source.intensity() * static_cast<float>(weight * cone.solidAngle())};
   }
 
   Illumination illuminate(const Vec3f& point, const Vec2f&) const override {
     Vec3d direction;
-    Illumination result = illuminateFromPoint(m_position, m_intensity, point, direction);
+    Illumination result = m_source.illuminate(point, direction);
     result.irradiance *= static_cast<float>(m_falloff(oneMinusCosBetween(direction, m_axis)));
     return result;
   }
 
   bool isDelta() const override { return true; }
-  bool isGrey() const override { return isGreyColor(m_intensity); }
+  bool isGrey() const override { return isGreyColor(m_source.intensity()); }
 
  private:
-  Vec3d m_position;  // local space [m]
-  Vec3d m_axis;      // unit, along propagation
-  Rgb m_intensity;   // on the axis [W/sr]
+  PointSource m_source;  // intensity on the axis
+  Vec3d m_axis;          // unit, along propagation
   Falloff m_falloff;
 };
 

@@ -1,7 +1,9 @@
 #include "photosphere/render/frame.h"
 
 #include <cmath>
+#include <cstring>
 #include <mutex>
+#include <type_traits>
 
 #include "photosphere/core/parallel.h"
 #include "photosphere/core/progress.h"
@@ -29,23 +31,30 @@ bool isNegative(const RayRadiance& r) {
   return false;
 }
 
-// Weighted sum of samples; the same fields as one.
+// Weighted sum of samples: the fields of RayRadiance, which is floats throughout, as one array.
 struct PixelSum {
-  RayRadiance sum;
+  static constexpr std::size_t kFields = sizeof(RayRadiance) / sizeof(float);
+  std::array<float, kFields> fields{};
   float weight = 0.0f;
 
-  PixelSum() { sum.transmittance = Rgb(0.0f); }
   void add(const RayRadiance& r, float w) {
-    sum.single += w * r.single;
-    sum.multiple += w * r.multiple;
-    sum.emission += w * r.emission;
-    sum.background += w * r.background;
-    sum.transmittance += w * r.transmittance;
-    sum.depth += w * r.depth;
-    sum.opacity += w * r.opacity;
+    std::array<float, kFields> values;
+    std::memcpy(values.data(), &r, sizeof r);
+    for (std::size_t i = 0; i < kFields; ++i)
+      fields[i] += w * values[i];
     weight += w;
   }
+  RayRadiance mean() const {
+    RayRadiance r;
+    std::array<float, kFields> values;
+    const float scale = weight > 0.0f ? 1.0f / weight : 0.0f;
+    for (std::size_t i = 0; i < kFields; ++i)
+      values[i] = fields[i] * scale;
+    std::memcpy(static_cast<void*>(&r), values.data(), sizeof r);
+    return r;
+  }
 };
+static_assert(std::is_trivially_copyable_v<RayRadiance>);
 
 // Offset of sample s from the pixel centre: the R2 sequence (Roberts 2018), the same in every
 // pixel, so that the samples of a frame form shifted lattices.
@@ -85,6 +94,7 @@ class FrameLoop {
     m_count = endSample - firstSample;
     for (int s = firstSample; s < endSample; ++s)
       m_offsets[static_cast<std::size_t>(s - firstSample)] = sampleOffset(s);
+    const std::vector<Tap> filter = taps();
     const int top = m_out.crop.min.y - m_border, bottom = m_out.crop.max.y + m_border;
     std::vector<std::vector<RayRadiance>> rows;  // traced, from row `kept` on
     int kept = top, traced = top;
@@ -98,7 +108,7 @@ class FrameLoop {
       traced = needed;
       parallelFor(static_cast<std::size_t>(y1 - y0), 1, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i)
-          filterRow(rows, kept, y0 + static_cast<int>(i));
+          filterRow(rows, kept, y0 + static_cast<int>(i), filter);
       });
       const int keep = y1 - m_border;
       rows.erase(rows.begin(), rows.begin() + (keep - kept));
@@ -164,38 +174,52 @@ class FrameLoop {
     if (bad.first.x >= 0 && m_out.firstBad.x < 0) m_out.firstBad = bad.first;
   }
 
-  void filterRow(const std::vector<std::vector<RayRadiance>>& rows, int kept, int y) {
-    const int width = m_out.width();
-    for (int dy = -m_border; dy <= m_border; ++dy) {
-      const auto& row = rows[static_cast<std::size_t>(y + dy - kept)];
+  // The samples that a pixel is made of, and their weights: the same for every pixel of a pass.
+  struct Tap {
+    int row;             // of samples, relative to the pixel's
+    std::size_t sample;  // in that row, from the pixel's own place on
+    float weight;
+  };
+  std::vector<Tap> taps() const {
+    std::vector<Tap> all;
+    for (int dy = -m_border; dy <= m_border; ++dy)
       for (int dx = -m_border; dx <= m_border; ++dx)
         for (int s = 0; s < m_count; ++s) {
           const float w = m_filter.weight(Vec2d(dx, dy) + m_offsets[static_cast<std::size_t>(s)]);
-          if (!(w > 0.0f)) continue;
-          for (int x = 0; x < width; ++x)
-            m_sums[static_cast<std::size_t>(y - m_out.crop.min.y) *
-                       static_cast<std::size_t>(width) +
-                   static_cast<std::size_t>(x)]
-                .add(row[static_cast<std::size_t>((x + dx + m_border) * m_count + s)], w);
+          if (w > 0.0f)
+            all.push_back({dy, static_cast<std::size_t>((dx + m_border) * m_count + s), w});
         }
+    return all;
+  }
+
+  void filterRow(const std::vector<std::vector<RayRadiance>>& rows, int kept, int y,
+                 const std::vector<Tap>& taps) {
+    const auto width = static_cast<std::size_t>(m_out.width());
+    PixelSum* sums = m_sums.data() + static_cast<std::size_t>(y - m_out.crop.min.y) * width;
+    for (std::size_t x = 0; x < width; ++x) {
+      PixelSum sum = sums[x];
+      for (const Tap& tap : taps)
+        sum.add(rows[static_cast<std::size_t>(y + tap.row - kept)]
+                    [x * static_cast<std::size_t>(m_count) + tap.sample],
+                tap.weight);
+      sums[x] = sum;
     }
   }
 
   void finish() {
     const double unitsPerMeter = 1.0 / m_options.space.metersPerUnit;
     for (std::size_t i = 0; i < m_sums.size(); ++i) {
-      const RayRadiance& sum = m_sums[i].sum;
-      const float scale = m_sums[i].weight > 0.0f ? 1.0f / m_sums[i].weight : 0.0f;
-      m_out.single[i] = sum.single * scale;
-      m_out.multiple[i] = sum.multiple * scale;
-      m_out.emission[i] = sum.emission * scale;
-      m_out.background[i] = sum.background * scale;
-      m_out.beauty[i] = sum.total() * scale;
-      m_out.transmittance[i] = sum.transmittance * scale;
+      const RayRadiance mean = m_sums[i].mean();
+      m_out.single[i] = mean.single;
+      m_out.multiple[i] = mean.multiple;
+      m_out.emission[i] = mean.emission;
+      m_out.background[i] = mean.background;
+      m_out.beauty[i] = mean.total();
+      m_out.transmittance[i] = mean.transmittance;
       m_out.alpha[i] = 1.0f - meanComponent(m_out.transmittance[i]);
-      if (sum.opacity * scale > 1e-6f)
+      if (mean.opacity > 1e-6f)
         m_out.depth[i] =
-            static_cast<float>(static_cast<double>(sum.depth / sum.opacity) * unitsPerMeter);
+            static_cast<float>(static_cast<double>(mean.depth / mean.opacity) * unitsPerMeter);
     }
   }
 

@@ -16,7 +16,9 @@ class PathIntegrator final : public Integrator {
  public:
   PathIntegrator(const Medium& medium, const transport::LightList& lights,
                  const PathOptions& options)
-      : m_medium(medium), m_options(options) {
+      : m_medium(medium),
+        m_options(options),
+        m_emission(options.effects.emission ? medium.emission() : nullptr) {
     for (const auto& light : lights) {
       m_backgrounds.push_back(light.get());
       const bool sampled =
@@ -52,6 +54,8 @@ class PathIntegrator final : public Integrator {
         hit = transport::sampleCollision(m_medium, segment.origin, segment.direction,
                                          segment.length, rng, counters.tracking);
       }
+      if (m_emission && segment.length > 0.0f)
+        addEmission(result, throughput, segment, hit, scatterings, rng);
       if (!hit.happened()) {
         const Vec3f d = scatterings == 0 ? direction : segment.direction;
         addEscape(result, throughput, d, scatterings);
@@ -86,6 +90,16 @@ class PathIntegrator final : public Integrator {
  private:
   static void add(RayRadiance& result, const Rgb& value, int scatterings) {
     (scatterings == 1 ? result.single : result.multiple) += value;
+  }
+
+  // Light that the smoke gives off along the flight: the `emission` layer where the eye sees it,
+  // else scattered at least once, which is `multiple` (`single` is the lamps').
+  void addEmission(RayRadiance& result, const Rgb& throughput, const Segment& flight,
+                   const Collision& hit, int scatterings, Rng& rng) const {
+    const float length = hit.happened() ? hit.distance : flight.length;
+    (scatterings == 0 ? result.emission : result.multiple) +=
+        throughput * transport::sampleEmission(m_medium, *m_emission, flight.origin,
+                                               flight.direction, length, rng);
   }
 
   // Light that the path meets by leaving the smoke after this many scatterings.
@@ -142,6 +156,7 @@ class PathIntegrator final : public Integrator {
 
   const Medium& m_medium;
   PathOptions m_options;
+  const transport::Emission* m_emission;            // nullptr where there is none
   std::vector<const lights::Light*> m_sampled;      // lamps of next-event estimation
   std::vector<const lights::Light*> m_backgrounds;  // every lamp: what escaping rays meet
   std::vector<double> m_cumulative;

@@ -10,6 +10,7 @@
 #include "photosphere/scene/frame_setup.h"
 #include "photosphere/scene/scene_file.h"
 #include "photosphere/transport/tracking.h"
+#include "photosphere/volume/optical_depth.h"
 #include "photosphere/volume/vdb_file.h"
 #include "scene_reader.h"
 #include "smoke_source.h"
@@ -20,7 +21,6 @@ namespace {
 
 constexpr double kFov = 30.0;
 constexpr double kAlbedo = 0.9, kAnisotropy = 0.4;
-constexpr double kMedianDepth = 5.0;
 
 // Irradiance at the smoke's centre [W/m^2]. Smoke this deep of albedo 0.9 and g 0.4 acts like an
 // isotropic medium of albedo (1-g) w / (1 - g w) = 0.84, whose diffuse reflectance (1 - s) / (1 +
@@ -110,8 +110,9 @@ std::vector<double> axisDepths(const transport::Medium& medium) {
     for (int i = 0; i < kRays * kRays; ++i) {
       Vec3d from = box.min;
       const int a = (axis + 1) % 3, b = (axis + 2) % 3;
-      from[a] += (i % kRays + 0.5) / kRays * box.extent()[a];
-      from[b] += (i / kRays + 0.5) / kRays * box.extent()[b];
+      const int column = i % kRays, row = i / kRays;
+      from[a] += (column + 0.5) / kRays * box.extent()[a];
+      from[b] += (row + 0.5) / kRays * box.extent()[b];
       Vec3f d(0.0f);
       d[axis] = 1.0f;
       const double depth = static_cast<double>(transport::marchOpticalDepth(
@@ -119,15 +120,9 @@ std::vector<double> axisDepths(const transport::Medium& medium) {
       largest = std::max(largest, depth);
       depths.push_back(depth);
     }
-  // Columns of stray voxels would drag the median down.
-  std::erase_if(depths, [&](double d) { return !(d > 0.01 * largest); });
+  std::erase_if(depths, [&](double d) { return !(d > volume::kTraceDepth * largest); });
   std::sort(depths.begin(), depths.end());
   return depths;
-}
-
-double twoDigits(double value) {
-  const double unit = std::pow(10.0, std::floor(std::log10(value)) - 1);
-  return std::round(value / unit) * unit;
 }
 
 double chooseScale(const transport::Medium& medium, std::vector<std::string>& choices) {
@@ -135,7 +130,7 @@ double chooseScale(const transport::Medium& medium, std::vector<std::string>& ch
   if (depths.empty() || !(depths[depths.size() / 2] > 0)) return 1.0;
   const double median = depths[depths.size() / 2];
   const double high = depths[depths.size() * 9 / 10];
-  const double scale = twoDigits(kMedianDepth / median);
+  const double scale = volume::roundedToTwoDigits(volume::kSmokeDepth / median);
   choices.push_back(
       fmt::format("density_scale = {:g}: the median optical depth along the axes becomes {:.1f} "
                   "(90 % lie below "

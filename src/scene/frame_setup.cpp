@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "estimator_options.h"
 #include "photon_map_stage.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/frames.h"
@@ -12,6 +13,7 @@
 #include "photosphere/phase/phase.h"
 #include "photosphere/volume/rasterize.h"
 #include "smoke_source.h"
+#include "volume_emission.h"
 
 namespace photosphere::scene {
 
@@ -44,6 +46,7 @@ std::uint64_t memoryBudget(const SceneFile& scene) {
 transport::MediumVolume placeVolume(const VolumeEntry& entry, const VolumeSource& source,
                                     const lights::LocalSpace& space, std::uint64_t budget) {
   transport::MediumVolume placed;
+  if (!source.density) return placed;
   placed.name = source.density.name();
   placed.density = volume::bricksFromGrid(source.density, 0, source.path, false, budget);
   placed.localFromNode = localFromWorld(space) * source.worldFromIndex(source.density) *
@@ -63,12 +66,19 @@ transport::MediumVolume placeVolume(const VolumeEntry& entry, const VolumeSource
   return placed;
 }
 
+// True when something in the source can be seen at this density scale.
+bool visible(const VolumeSource& source, double densityScale) {
+  const bool smoke = source.density && !source.density.activeBounds().empty() && densityScale > 0;
+  return smoke || (source.emission && !source.emission.activeBounds().empty());
+}
+
 // Two passes: where the smoke is, then the smoke about its own centre.
 void buildMedium(const SceneFile& scene, std::int64_t cacheFrame, bool wantParticles,
                  FrameSetup& setup) {
   std::vector<VolumeSource> sources;
+  const bool glows = scene.effects.text("emission") != "off";
   for (const VolumeEntry& entry : scene.volumes) {
-    sources.push_back(readVolume(scene, entry, cacheFrame, wantParticles));
+    sources.push_back(readVolume(scene, entry, cacheFrame, wantParticles, glows));
     setup.readSeconds += sources.back().readSeconds;
     setup.rasterizeSeconds += sources.back().rasterizeSeconds;
     setup.worldBounds.grow(sources.back().bounds());
@@ -84,15 +94,19 @@ void buildMedium(const SceneFile& scene, std::int64_t cacheFrame, bool wantParti
     for (const Vec3d& p : sources[i].particles)
       setup.particles.emplace_back(setup.space.localFromWorld(p));
     const double scale = scene.volumes[i].values.vec3("density_scale").x;
-    if (sources[i].bounds().empty() || !(scale > 0)) {
+    if (!visible(sources[i], scale)) {
       setup.notes.push_back(fmt::format("{}: no smoke in it at this frame", sources[i].path));
       continue;
     }
     placed.push_back(placeVolume(scene.volumes[i], sources[i], setup.space, setup.memoryBudget));
-    if (placed.back().density.empty()) placed.pop_back();
+    if (sources[i].emission)
+      placed.back().emission =
+          placeEmission(scene.volumes[i], sources[i], localFromWorld(setup.space),
+                        scene.output.text("colorspace"), setup.memoryBudget, setup.notes);
+    if (placed.back().density.empty() && placed.back().emission.field.empty()) placed.pop_back();
   }
   setup.medium = std::make_unique<transport::Medium>(std::move(placed));
-  // Active voxels may hold zeros: what frames the smoke is the box of what scatters.
+  // Active voxels may hold zeros: what frames the smoke is the box of what scatters or emits.
   setup.worldBounds = Box3d();
   if (const Box3d& local = setup.medium->bounds(); !local.empty()) {
     setup.worldBounds.grow(setup.space.worldFromLocal(local.min));
@@ -177,17 +191,22 @@ class EffectPlan {
 
   void decide() {
     Effects& e = m_setup.effects;
-    const std::string dark = m_setup.medium->bounds().empty() ? "there is no smoke"
-                             : m_setup.lights.empty()         ? "there is no light"
-                             : m_setup.medium->maximumAlbedo() <= 0
-                                 ? "the smoke only absorbs (albedo 0)"
-                                 : "";
+    const transport::Medium& medium = *m_setup.medium;
+    const bool glows = medium.emission() != nullptr;
+    const bool lamps = !m_setup.lights.empty();
+    const std::string inert = !(medium.majorants().maximum() > 0) ? "there is no smoke"
+                              : medium.maximumAlbedo() <= 0 ? "the smoke only absorbs (albedo 0)"
+                                                            : "";
+    const std::string dark = !inert.empty() ? inert : lamps ? "" : "there is no light";
     const bool single = m_scene.estimator.text("type") == "single";
-    e.emission = note("emission", false, "no volume emits");
+    e.emission = unlessOff("emission", glows ? "" : "no volume emits", "a volume emits");
     e.singleScattering = unlessOff("single_scattering", dark, "lights reach smoke that scatters");
-    e.multipleScattering =
-        unlessOff("multiple_scattering", single ? "estimator.type is single" : dark,
-                  "lights reach smoke that scatters");
+    e.multipleScattering = unlessOff(
+        "multiple_scattering",
+        single                   ? "estimator.type is single"
+        : glows && inert.empty() ? ""
+                                 : dark,
+        lamps ? "lights reach smoke that scatters" : "smoke scatters the light that it gives off");
     e.shadows = unlessOff("shadows", dark, "smoke casts shadows on itself");
     chromatic();
     e.motionBlur = note("motion_blur", false, "no volume has a velocity");
@@ -211,6 +230,8 @@ class EffectPlan {
   }
   void chromatic() {
     std::string coloured = m_setup.medium->isGrey() ? "" : "an albedo is coloured";
+    const transport::Emission* emission = m_setup.medium->emission();
+    if (emission && !emission->isGrey()) coloured = "the emission is coloured";
     for (const auto& light : m_setup.lights)
       if (!light->isGrey()) coloured = fmt::format("light '{}' is coloured", light->name());
     const std::string& wish = m_scene.effects.text("chromatic");
@@ -222,7 +243,7 @@ class EffectPlan {
     m_setup.effects.chromatic =
         wish == "on" ? note("chromatic", true, "on in the scene")
                      : note("chromatic", !coloured.empty(),
-                            coloured.empty() ? "lights and albedos are grey" : coloured);
+                            coloured.empty() ? "lights, albedos and emission are grey" : coloured);
   }
 
   const SceneFile& m_scene;
@@ -240,25 +261,22 @@ void buildLayout(const SceneFile& scene, const SetupOptions& options, FrameSetup
   using namespace estimators;
   const ParamValues& e = scene.estimator;
   LightFieldLayout& l = setup.layout;
-  const std::string& basis = e.text("basis");
   const bool cached = options.forLightCache || !e.text("cache").empty();
-  l.carrier = e.text("carrier") == "particles" ? Carrier::particles : Carrier::voxels;
-  l.basis = basis == "view" || (basis == "auto" && !cached) ? Basis::view : Basis::histogram;
-  l.deposit = e.text("deposit") == "collision" ? Deposit::collision : Deposit::trackLength;
-  l.energy = e.text("energy") == "scatter" ? EnergyRule::scatter : EnergyRule::gather;
-  l.kernel = spatialKernel(e.text("spatial_kernel"));
-  l.rows = static_cast<int>(e.integer("rows"));
+  l = layoutOf(e, cached);
   l.channels = setup.effects.chromatic ? 3 : 1;
   l.phases = static_cast<int>(setup.medium->phases().size());
   for (const auto& light : setup.lights)
     l.unscattered = l.unscattered || (!light->isDelta() && setup.effects.singleScattering);
-  l.lightVoxel = e.real("light_voxel");
   l.radius = e.real("radius") * setup.space.metersPerUnit;
   if (!(l.radius > 0)) {
     l.radius = automaticRadius(*setup.medium, l, static_cast<std::uint64_t>(e.integer("photons")));
-    // About 20 particles where they fill space evenly: a ball of 3 spacings.
-    if (l.carrier == Carrier::particles)
-      l.radius = std::max(l.radius, 3.0 * carrierSpacing(setup.particles));
+    if (l.carrier == Carrier::particles) {
+      // About 20 particles where they fill space evenly: a ball of 3 spacings. Power is smoothed
+      // with the smoke it was left in, so it takes no more than that: what a wider radius blurs
+      // over the smoke's edge soon exceeds the noise that it removes (README.md).
+      const double spacings = 3.0 * carrierSpacing(setup.particles);
+      l.radius = l.holdsPower() && spacings > 0 ? spacings : std::max(l.radius, spacings);
+    }
   }
   const double deposit = e.real("deposit_radius") * setup.space.metersPerUnit;
   l.depositRadius = deposit > 0 ? deposit : l.radius;
@@ -298,21 +316,24 @@ std::uint64_t predictedLightBytes(const FrameSetup& setup) {
   if (setup.photonMap) return estimators::photonMapBytes(*setup.photonMap, setup.photonMapPhotons);
   const estimators::LightFieldLayout& l = setup.layout;
   const auto values = static_cast<std::uint64_t>(l.valuesPerCarrier());
-  constexpr std::uint64_t kBytes = sizeof(std::int64_t) + sizeof(float);
+  // Per step the floats are sharpened, which takes as many again.
+  const bool perStep = l.evaluate == estimators::Evaluate::perStep;
+  const std::uint64_t bytesEach = sizeof(std::int64_t) + sizeof(float) * (perStep ? 2 : 1);
   const transport::Medium& medium = *setup.medium;
   if (medium.bounds().empty()) return 0;
   std::uint64_t bytes = 0;
-  if (l.carrier == estimators::Carrier::particles) bytes = setup.particles.size() * values * kBytes;
+  if (l.carrier == estimators::Carrier::particles)
+    bytes = setup.particles.size() * values * bytesEach;
   if (l.holdsPower()) return bytes;
   const double edge = l.lightVoxel * medium.voxelEdge();
   const int margin = static_cast<int>(std::ceil(l.radius / edge)) + 1;
   // A full box is an upper bound that costs nothing; only a large one is worth counting exactly.
   const Vec3d cells = glm::ceil(medium.bounds().extent() / edge) + 2.0 * margin + 8.0;
-  const double perVoxel = static_cast<double>(values * kBytes);
+  const double perVoxel = static_cast<double>(values * bytesEach);
   const double most = cells.x * cells.y * cells.z * perVoxel;
   if (setup.memoryBudget == 0 || most < 0.5 * static_cast<double>(setup.memoryBudget))
     return bytes + static_cast<std::uint64_t>(most);
-  return bytes + transport::SupportLattice(medium, edge, margin).size() * values * kBytes;
+  return bytes + transport::SupportLattice(medium, edge, margin).size() * values * bytesEach;
 }
 
 void checkMemory(const FrameSetup& setup, bool storedLight) {

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "photosphere/core/error.h"
 #include "photosphere/core/frames.h"
 #include "photosphere/core/hash.h"
 #include "photosphere/core/resources.h"
@@ -36,7 +37,7 @@ void noteIdleKeys(const SceneFile& scene, FrameSetup& setup) {
   std::vector<std::string_view> idle;
   for (const std::string_view key :
        {"photons", "radius", "deposit_radius", "spatial_kernel", "carrier", "basis", "deposit",
-        "rows", "energy", "light_voxel"})
+        "rows", "order", "energy", "direction", "representative", "light_voxel"})
     if (scene.estimator.given(key)) idle.push_back(key);
   if (!idle.empty())
     setup.notes.push_back(
@@ -52,7 +53,23 @@ estimators::LightField readField(const SceneFile& scene, bool allowStale, FrameS
   const std::string path = framePath(scene.resolvePath(scene.estimator.text("cache")), setup.frame);
   estimators::LightField field =
       estimators::readLightCache(path, cacheKey(scene, setup), allowStale);
-  setup.layout = field.layout;
+  // How light is read is the scene's to say; kernel and bandwidth were used up where they spread
+  // it.
+  estimators::LightFieldLayout& layout = field.layout;
+  layout.merge = setup.layout.merge;
+  layout.evaluate = setup.layout.evaluate;
+  layout.directions = setup.layout.directions;
+  if (layout.direction != sphere::DirectionDeposit::kernel) {
+    layout.angularKernel = setup.layout.angularKernel;
+    layout.bandwidth = setup.layout.bandwidth;
+    layout.truncation = setup.layout.truncation;
+  }
+  try {
+    estimators::checkLayout(layout);
+  } catch (const ConfigError& error) {
+    throw ConfigError(fmt::format("[estimator] with the light cache {}: {}", path, error.what()));
+  }
+  setup.layout = layout;
   noteIdleKeys(scene, setup);
   statistics.photonsEmitted = field.photons;
   statistics.lightMemoryBytes = field.memoryBytes();
@@ -87,9 +104,10 @@ estimators::LightField lightField(const SceneFile& scene, const RenderRequest& r
   estimators::LightField field = estimators::traceLightField(
       *setup.medium, setup.lights, setup.layout, setup.view, setup.particles, options, traced);
   addTraced(traced, statistics);
-  // Every flight after a scattering leaves light; the first one does where lamps with extent are
-  // kept.
-  statistics.photonsStored += setup.layout.unscattered ? traced.flights : traced.scatterings;
+  // Every flight after a scattering or from the smoke's own emission leaves light; the first one of
+  // a lamp does where lamps with extent are kept.
+  statistics.photonsStored +=
+      setup.layout.unscattered ? traced.flights : traced.scatterings + traced.born;
   statistics.lightMemoryBytes = field.memoryBytes();
   if (field.farPhotons > 0)
     setup.notes.push_back(fmt::format(

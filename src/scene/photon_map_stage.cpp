@@ -14,14 +14,6 @@ using estimators::PhotonMapLayout;
 // Radius that the ball of the nearest photons keeps to where none is given [density voxels].
 constexpr double kWidestBall = 8.0;
 
-sphere::SmoothingKernel directionKernel(const ParamValues& e) {
-  const std::string& name = e.text("kernel");
-  if (name == "none") return {};
-  return {
-      name == "gaussian" ? sphere::AngularKernel::gaussian : sphere::AngularKernel::epanechnikov,
-      e.real("bandwidth"), e.real("truncation")};
-}
-
 std::uint32_t neighbors(const ParamValues& e) {
   const std::int64_t nearest = e.integer("neighbors"), most = e.integer("max_photons");
   const std::int64_t both = nearest > 0 && most > 0 ? std::min(nearest, most) : nearest + most;
@@ -41,22 +33,17 @@ transport::TraceOptions traceOptions(const FrameSetup& setup, int pass) {
 
 }  // namespace
 
-estimators::SpatialKernel spatialKernel(const std::string& name) {
-  if (name == "box") return estimators::SpatialKernel::box;
-  if (name == "gaussian") return estimators::SpatialKernel::gaussian;
-  return estimators::SpatialKernel::epanechnikov;
-}
-
 void planPhotonMap(const SceneFile& scene, FrameSetup& setup) {
   const ParamValues& e = scene.estimator;
   if (e.text("type") != "photon_map" || !storesLight(scene, setup)) return;
   PhotonMapLayout& map = setup.photonMap.emplace();
-  map.kernel = spatialKernel(e.text("spatial_kernel"));
+  map.kernel = setup.layout.kernel;
   map.neighbors = neighbors(e);
   map.passes = static_cast<int>(e.integer("passes"));
   map.channels = setup.layout.channels;
   map.unscattered = setup.layout.unscattered;
-  map.directionKernel = directionKernel(e);
+  map.directionKernel = {setup.layout.angularKernel, setup.layout.bandwidth,
+                         setup.layout.truncation};
   const estimators::PhotonForecast forecast = estimators::forecastPhotons(
       *setup.medium, setup.lights, map.unscattered, traceOptions(setup, 0));
   setup.photonMapPhotons = forecast.photons;

@@ -6,9 +6,6 @@
 
 namespace photosphere::scene {
 
-/// By its name in a scene file.
-estimators::SpatialKernel spatialKernel(const std::string& name);
-
 /// Fills `setup.photonMap` for estimator.type = "photon_map": settings, and the photons to expect
 /// from a short trace. @throws ConfigError
 void planPhotonMap(const SceneFile& scene, FrameSetup& setup);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator_options.h"
 #include "light_stage.h"
 #include "photon_map_stage.h"
 #include "photosphere/core/error.h"
@@ -83,17 +84,17 @@ std::vector<std::string> presentLayers(const FrameSetup& setup) {
   return names;
 }
 
-std::string describe(const FrameSetup& setup) {
-  using namespace estimators;
-  const LightFieldLayout& l = setup.layout;
-  const std::string basis = l.basis == Basis::view
-                                ? "view"
-                                : fmt::format("histogram of {} bins ({} rows)", l.bins(), l.rows);
-  return fmt::format(
-      "{}, {}, {}, {} channel{}{}", l.carrier == Carrier::particles ? "particles" : "voxels", basis,
-      l.deposit == Deposit::collision ? "collision" : "track_length", l.channels,
-      l.channels == 1 ? "" : "s",
-      l.holdsPower() ? (l.energy == EnergyRule::scatter ? ", scatter" : ", gather") : "");
+// A basis that can go negative is clamped where it is read.
+void noteClamped(double share, FrameSetup& setup, FrameStatistics& statistics) {
+  statistics.clampedLight = share;
+  if (!(share > 0.001)) return;
+  setup.notes.push_back(fmt::format(
+      "{:.2g} of the stored light is below zero toward where it is read and counts as 0, a bias of "
+      "the basis beside sharp peaks; raise estimator.{}",
+      share,
+      setup.layout.basis == estimators::Basis::sphericalHarmonics
+          ? "order, or smooth with estimator.kernel"
+          : "rows"));
 }
 
 std::string describe(const estimators::PhotonMapLayout& map) {
@@ -117,7 +118,7 @@ Source widened(const FrameSetup& setup, estimators::LightField field) {
   // A kernel narrower than a light voxel does nothing: the voxel itself is the width there.
   const double edge = field.layout.lightVoxel * setup.medium->voxelEdge();
   field.layout.radius = kWidening * std::max(field.layout.radius, edge);
-  return estimators::resolve(*setup.medium, field, setup.view);
+  return estimators::resolve(*setup.medium, std::move(field), setup.view, setup.key);
 }
 
 PassLight prepareLight(const SceneFile& scene, const RenderRequest& request, int pass, bool wider,
@@ -132,13 +133,15 @@ PassLight prepareLight(const SceneFile& scene, const RenderRequest& request, int
     if (wider) light.wider = photonMapPass(setup, pass, kWidening, again);
     return light;
   }
-  const estimators::LightField field = lightField(scene, request, setup, result.statistics);
-  result.layout = describe(setup);
+  estimators::LightField field = lightField(scene, request, setup, result.statistics);
+  result.layout = describeLayout(setup.layout);
   result.radius = setup.layout.radius / setup.space.metersPerUnit;
   const Stopwatch watch;
-  light.source = estimators::resolve(*setup.medium, field, setup.view);
   if (wider) light.wider = widened(setup, field);
+  auto source = estimators::resolve(*setup.medium, std::move(field), setup.view, setup.key);
   result.statistics.seconds.resolve += watch.seconds();
+  noteClamped(source->clampedShare(), setup, result.statistics);
+  light.source = std::move(source);
   return light;
 }
 
@@ -172,7 +175,11 @@ class LayerRenderer {
     m_path.effects = m_march.effects = setup.effects;
     m_march.step = static_cast<float>(scene.render.real("step"));
     if (m_paths) return;
-    const auto mode = setup.effects.singleScattering && setup.effects.shadows
+    if (storesLight(scene, setup))
+      m_march.gatherRays = static_cast<int>(
+          (scene.estimator.integer("final_gather") + m_options.samples - 1) / m_options.samples);
+    const bool shadowed = setup.effects.singleScattering && setup.effects.shadows;
+    const auto mode = shadowed || m_march.gatherRays > 0
                           ? shadowMode(scene.render.text("shadow"))
                           : render::ShadowMode::march;  // tabulates nothing
     m_shadows.emplace(*setup.medium, setup.lights, mode,
@@ -383,7 +390,7 @@ FrameStatistics traceScene(const SceneFile& scene, std::int64_t frame, const std
   if (scene.estimator.text("basis") == "view")
     throw ConfigError(
         "estimator.basis = \"view\" holds light for one camera and cannot be cached; use "
-        "\"histogram\" or \"auto\"");
+        "\"histogram\", \"spherical_harmonics\" or \"auto\"");
   const Stopwatch total;
   const double cpuBefore = processCpuSeconds();
   SetupOptions options = setupOptions(request);

@@ -44,13 +44,20 @@ class Dumper {
 
  private:
   std::string volumeExtras(const VolumeEntry& volume) const {
-    std::string phase = fmt::format("phase = {{ type = \"{}\"", volume.phase);
+    std::string extras;
+    if (!volume.albedoGrid.empty())
+      extras += fmt::format("albedo = {}\n", tomlText(volume.albedoGrid));
+    extras += fmt::format("phase = {{ type = \"{}\"", volume.phase);
     for (const Param& row : volume.phaseValues.rows())
       if (row.served)
-        phase += fmt::format(", {} = {}", row.name, volume.phaseValues.format(row.name));
-    phase += " }\n";
-    if (volume.albedoGrid.empty()) return phase;
-    return fmt::format("albedo = {}\n{}", tomlText(volume.albedoGrid), phase);
+        extras += fmt::format(", {} = {}", row.name, volume.phaseValues.format(row.name));
+    extras += " }\n";
+    if (!volume.emits) return extras;
+    std::vector<std::string> keys;
+    for (const Param& row : volume.emission.rows())
+      if (volume.emission.given(row.name))
+        keys.push_back(fmt::format("{} = {}", row.name, volume.emission.format(row.name)));
+    return extras + fmt::format("emission = {{ {} }}\n", fmt::join(keys, ", "));
   }
 
   // Given values as they are; the others as comments with their defaults, ready to be edited.

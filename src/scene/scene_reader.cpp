@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "estimator_options.h"
 #include "photosphere/cameras/camera.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/frames.h"
@@ -235,11 +236,35 @@ void SceneReader::readPhase(const toml::node& node, const std::string& path,
   }
 }
 
+void SceneReader::readEmission(const toml::node& node, const std::string& path,
+                               VolumeEntry& entry) const {
+  const std::string place = where(node, path, path);
+  const toml::table* from = node.as_table();
+  if (!from)
+    throw ConfigError(fmt::format(
+        "{}: 'emission' must be a table such as {{ grid = \"flame\", scale = 20.0 }}", place));
+  entry.emits = true;
+  for (const auto& [key, value] : *from) {
+    const std::string k(key.str());
+    const std::string at = where(value, path + "." + k, path);
+    entry.emission.set(k, hasRow(entry.emission, k) ? valueOf(value, k, at) : ParamValue(), at);
+  }
+  const bool thermal = !entry.emission.text("temperature").empty();
+  if (thermal == !entry.emission.text("grid").empty())
+    throw ConfigError(fmt::format(
+        "{}: 'emission' needs either 'grid' or 'temperature', the name of a grid", place));
+  for (const std::string_view key : {"color", "kelvin_scale", "kelvin_offset"})
+    if (entry.emission.given(key) && thermal == (key == "color"))
+      throw ConfigError(fmt::format("{}: '{}' does not go with '{}'", place, key,
+                                    thermal ? "temperature" : "grid"));
+}
+
 void SceneReader::readVolume(const toml::table& from, std::size_t index) {
   const std::string path = fmt::format("volume.{}", index);
   VolumeEntry entry;
   entry.where = where(from, path, path);
   entry.values = ParamValues(volumeParams());
+  entry.emission = ParamValues(emissionParams());
   entry.phaseValues =
       ParamValues(findPlugin(phase::phaseFunctions(), entry.phase, "phase", entry.where).params);
   for (const auto& [key, node] : from) {
@@ -250,7 +275,7 @@ void SceneReader::readVolume(const toml::table& from, std::size_t index) {
     } else if (k == "albedo") {
       readAlbedo(node, place, entry);
     } else if (k == "emission") {
-      notServed(place, "'emission'");
+      readEmission(node, path + ".emission", entry);
     } else {
       entry.values.set(k, hasRow(entry.values, k) ? valueOf(node, k, place) : ParamValue(), place);
     }
@@ -318,6 +343,7 @@ void SceneReader::read() {
     for (std::size_t i = 0; i < lights->size(); ++i)
       readLight(*lights->get(i)->as_table(), i);
   readPlain("estimator", m_scene.estimator);
+  applyPreset(m_scene.estimator, m_text.name + ": [estimator]");
   readPlain("effects", m_scene.effects);
   readPlain("render", m_scene.render);
   readPlain("output", m_scene.output);
@@ -326,29 +352,7 @@ void SceneReader::read() {
 
 void checkCombinations(const SceneFile& scene, const std::string& name) {
   const ParamValues& e = scene.estimator;
-  const std::string place = name + ": [estimator]";
-  const bool particles = e.text("carrier") == "particles";
-  const bool collisions = e.text("deposit") == "collision";
-  if (e.text("energy") == "scatter" && !(particles && collisions))
-    throw ConfigError(place +
-                      ": energy = \"scatter\" needs carrier = \"particles\" and deposit = "
-                      "\"collision\"; other carriers hold no energy to share out");
-  if (e.real("deposit_radius") > 0 && !(particles && collisions))
-    throw ConfigError(place +
-                      ": 'deposit_radius' needs carrier = \"particles\" and deposit = "
-                      "\"collision\"; elsewhere use 'radius'");
-  if (!e.text("cache").empty() && e.text("type") != "photosphere")
-    throw ConfigError(
-        fmt::format("{}: 'cache' needs type = \"photosphere\", not \"{}\"", place, e.text("type")));
-  if (e.text("type") == "photosphere" && e.text("kernel") != "none")
-    throw ConfigError(
-        fmt::format("{}: kernel = \"{}\" is not served by this version yet for type = "
-                    "\"photosphere\", only for \"photon_map\"",
-                    place, e.text("kernel")));
-  if (!e.text("cache").empty() && e.text("basis") == "view")
-    throw ConfigError(place +
-                      ": basis = \"view\" holds light for one camera and is never cached; leave "
-                      "'basis' at auto with a 'cache'");
+  checkEstimator(e, name + ": [estimator]");
   const bool target = scene.render.real("target_error") > 0;
   if (target && !e.text("cache").empty())
     throw ConfigError(name +

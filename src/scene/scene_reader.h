@@ -31,6 +31,7 @@ class SceneReader {
   void readVolume(const toml::table& from, std::size_t index);
   void readAlbedo(const toml::node& node, const std::string& place, VolumeEntry& entry) const;
   void readPhase(const toml::node& node, const std::string& path, VolumeEntry& entry) const;
+  void readEmission(const toml::node& node, const std::string& path, VolumeEntry& entry) const;
   void readLight(const toml::table& from, std::size_t index);
 
   const TomlText& m_text;

@@ -121,19 +121,21 @@ Mat4d VolumeSource::worldFromIndex(const Grid& grid) const {
 
 Box3d VolumeSource::bounds() const {
   Box3d box;
-  const Box3i active = density ? density.activeBounds() : Box3i();
-  if (active.empty()) return box;
-  const Mat4d m = worldFromIndex(density);
-  // Interpolation reaches one voxel beyond the active ones.
-  for (int corner = 0; corner < 8; ++corner)
-    box.grow(transformPoint(m, Vec3d(corner & 1 ? active.max.x + 1 : active.min.x - 1,
-                                     corner & 2 ? active.max.y + 1 : active.min.y - 1,
-                                     corner & 4 ? active.max.z + 1 : active.min.z - 1)));
+  for (const Grid* grid : {&density, &emission}) {
+    const Box3i active = *grid ? grid->activeBounds() : Box3i();
+    if (active.empty()) continue;
+    const Mat4d m = worldFromIndex(*grid);
+    // Interpolation reaches one voxel beyond the active ones.
+    for (int corner = 0; corner < 8; ++corner)
+      box.grow(transformPoint(m, Vec3d(corner & 1 ? active.max.x + 1 : active.min.x - 1,
+                                       corner & 2 ? active.max.y + 1 : active.min.y - 1,
+                                       corner & 4 ? active.max.z + 1 : active.min.z - 1)));
+  }
   return box;
 }
 
 VolumeSource readVolume(const SceneFile& scene, const VolumeEntry& entry, std::int64_t frame,
-                        bool wantParticles) {
+                        bool wantParticles, bool wantEmission) {
   VolumeSource source;
   source.path = framePath(scene.resolvePath(entry.values.text("file")), frame);
   source.worldFromFile =
@@ -168,6 +170,17 @@ VolumeSource readVolume(const SceneFile& scene, const VolumeEntry& entry, std::i
     source.albedo = findGrid(cache, "albedo", entry.albedoGrid);
     checkAffine(source.path, source.albedo);
     checkAlbedo(source.path, source.albedo);
+  }
+  if (wantEmission && entry.emits) {
+    const std::string& temperature = entry.emission.text("temperature");
+    source.emission = temperature.empty()
+                          ? findGrid(cache, "emission.grid", entry.emission.text("grid"))
+                          : findGrid(cache, "emission.temperature", temperature);
+    if (source.emission.kind() != GridKind::scalar)
+      throw InputError(source.path,
+                       fmt::format("grid '{}' is of type {}; an emission is one number a voxel",
+                                   source.emission.name(), source.emission.valueType()));
+    checkAffine(source.path, source.emission);
   }
   if (wantParticles)
     for (const Grid& grid : cache.pointGrids)

@@ -30,6 +30,7 @@ struct VolumeSource {
   std::string path;
   volume::Grid density;
   volume::Grid albedo;           ///< empty handle = the scene's constant
+  volume::Grid emission;         ///< of values or temperatures; empty handle = none
   Mat4d worldFromFile{1.0};      ///< transform and origin of the scene file
   Vec3d indexShift{0.0};         ///< half a voxel where cell_centered
   std::vector<Vec3d> particles;  ///< world space, where wanted
@@ -37,14 +38,16 @@ struct VolumeSource {
   std::vector<std::string> notes;
 
   Mat4d worldFromIndex(const volume::Grid& grid) const;
-  /// Where trilinear density can be anything but zero, world space; empty without active voxels.
+  /// Where trilinear density or emission can be anything but zero, world space; empty without
+  /// active voxels.
   Box3d bounds() const;
 };
 
 /// @param wantParticles  also hand out the positions of the file's points
+/// @param wantEmission   also hand out the grid that the entry's `emission` names
 /// @throws InputMissingError; InputError for a missing grid (listing what is there), a frustum
 ///         transform, an albedo outside [0, 1]; ConfigError for a singular transform
 VolumeSource readVolume(const SceneFile& scene, const VolumeEntry& entry, std::int64_t frame,
-                        bool wantParticles);
+                        bool wantParticles, bool wantEmission);
 
 }  // namespace photosphere::scene

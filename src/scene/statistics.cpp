@@ -44,6 +44,7 @@ std::string statsJson(const FrameStatistics& s) {
                      {"bias", s.error->bias},
                      {"batches", s.batches},
                      {"target_missed", s.targetMissed}};
+  if (s.clampedLight > 0) json["clamped_light"] = s.clampedLight;
   json["effects"] = nlohmann::ordered_json::object();
   for (const EffectState& effect : s.effects)
     json["effects"][effect.name] = {{"on", effect.on}, {"why", effect.why}, {"bound", nullptr}};

@@ -46,10 +46,11 @@ Medium::Medium(std::vector<MediumVolume> volumes) : m_volumes(std::move(volumes)
   std::vector<volume::MajorantSource> sources;
   double edge = std::numeric_limits<double>::infinity();
   Hasher hasher;
+  std::vector<const VolumeEmission*> emitting;
   for (const MediumVolume& v : m_volumes) {
     sources.push_back({&v.density, v.localFromNode, v.densityScale});
-    for (int a = 0; a < 3; ++a)
-      edge = std::min(edge, glm::length(Vec3d(v.localFromNode[a])));
+    if (!v.density.empty()) edge = std::min(edge, volume::finestSpacing(v.localFromNode));
+    if (!v.emission.field.empty()) emitting.push_back(&v.emission);
     int phaseIndex = 0;
     while (phaseIndex < static_cast<int>(m_phases.size()) &&
            m_phases[static_cast<std::size_t>(phaseIndex)].g() != v.phase.g())
@@ -80,8 +81,15 @@ Medium::Medium(std::vector<MediumVolume> volumes) : m_volumes(std::move(volumes)
                     m_phases.size(), kMaxPhases));
   m_uniformAlbedo = m_volumes.size() == 1 && m_albedo.front().fields.empty();
   if (m_phases.empty()) m_phases.emplace_back(0.0);
+  if (!emitting.empty()) {
+    m_emission = std::make_unique<Emission>(emitting);
+    m_emission->hash(hasher);
+  }
+  const volume::WalkedRegion glow = m_emission ? m_emission->region() : volume::WalkedRegion{};
+  if (!std::isfinite(edge)) edge = glow.spacing;
   if (std::isfinite(edge)) m_voxelEdge = edge;
-  m_majorants = volume::MajorantGrid(sources);
+  m_majorants = volume::MajorantGrid(sources, glow);
+  if (m_emission) m_emission->markCells(m_majorants);
   m_hash = hasher.hex();
 }
 
@@ -107,7 +115,7 @@ void Medium::coefficients(const Vec3f& p, Coefficients& out) const {
 }
 
 std::uint64_t Medium::memoryBytes() const {
-  std::uint64_t bytes = m_majorants.memoryBytes();
+  std::uint64_t bytes = m_majorants.memoryBytes() + (m_emission ? m_emission->memoryBytes() : 0);
   for (const MediumVolume& v : m_volumes) {
     bytes += v.density.memoryBytes();
     for (const auto& field : v.albedoFields)

@@ -4,6 +4,7 @@
 
 #include "photosphere/core/parallel.h"
 #include "photosphere/core/progress.h"
+#include "photosphere/core/sampling.h"
 #include "photosphere/transport/scatter.h"
 #include "photosphere/transport/tracking.h"
 
@@ -32,23 +33,33 @@ struct BirthSequence {
     }
   }
   float operator()(std::uint64_t photon, std::size_t dimension) const {
-    const std::uint64_t x = photon * step[dimension] + shift[dimension];
-    return static_cast<float>(x >> 40) * 0x1p-24f;
+    return static_cast<float>(bits(photon, dimension) >> 40) * 0x1p-24f;
+  }
+  // Fine enough to choose among more nodes than a float has values.
+  double fine(std::uint64_t photon, std::size_t dimension) const {
+    return static_cast<double>(bits(photon, dimension) >> 11) * 0x1p-53;
+  }
+  std::uint64_t bits(std::uint64_t photon, std::size_t dimension) const {
+    return photon * step[dimension] + shift[dimension];
   }
 };
 
-// Chooses a light in proportion to its power.
-class LightChoice {
+// Chooses a source in proportion to its power: the lamps, then the medium's emission.
+class SourceChoice {
  public:
-  LightChoice(const LightList& lights, const lights::BoundingSphere& bounds) {
+  SourceChoice(const Medium& medium, const LightList& lights) {
+    const lights::BoundingSphere bounds = boundingSphere(medium);
     double sum = 0;
     for (const auto& light : lights) {
       const double p = maxComponent(Vec3d(light->power(bounds)));
       sum += p > 0 ? p : 0;
       m_cumulative.push_back(sum);
     }
+    if (const Emission* emission = medium.emission())
+      m_cumulative.push_back(sum += emission->birthPower());
     m_total = sum;
   }
+  double total() const { return m_total; }
   bool dark() const { return !(m_total > 0); }
   std::size_t choose(float u) const {
     const double target = static_cast<double>(u) * m_total;
@@ -66,6 +77,7 @@ class LightChoice {
 
 void accumulate(TraceStatistics& sum, const TraceStatistics& part) {
   sum.photons += part.photons;
+  sum.born += part.born;
   sum.scatterings += part.scatterings;
   sum.flights += part.flights;
   sum.capped += part.capped;
@@ -96,6 +108,62 @@ class Batch {
   }
   FlightSink* m_sink;
   std::vector<Flight> m_flights;
+};
+
+// Births of a frame's photons.
+class Births {
+ public:
+  Births(const Medium& medium, const LightList& lights, RandomKey key)
+      : m_medium(medium),
+        m_lights(lights),
+        m_bounds(boundingSphere(medium)),
+        m_choice(medium, lights),
+        m_sequence(key) {}
+  bool dark() const { return m_choice.dark(); }
+
+  // The first flight of a photon, clipped to the medium's bounds; of length 0 where it misses them.
+  Flight operator()(std::uint64_t photon, Rng& rng) const {
+    const std::size_t source = m_choice.choose(m_sequence(photon, 0));
+    Flight flight;
+    flight.photon = photon;
+    if (source == m_lights.size())
+      bornInSmoke(photon, rng, flight);
+    else
+      sentByLamp(source, photon, flight);
+    flight.power /= static_cast<float>(m_choice.probability(source));
+    return flight;
+  }
+
+ private:
+  void bornInSmoke(std::uint64_t photon, Rng& rng, Flight& flight) const {
+    const Vec2f u = rng.uniform2();
+    const Emission::Birth birth =
+        m_medium.emission()->birth(m_sequence.fine(photon, 1), Vec3f(u, rng.uniform()));
+    flight.light = kEmittedBySmoke;
+    flight.power = birth.power;
+    flight.origin = birth.origin;
+    flight.direction = sampleSphere(Vec2f(m_sequence(photon, 2), m_sequence(photon, 3)));
+    flight.length = exitDistance(m_medium, flight.origin, flight.direction);
+  }
+
+  void sentByLamp(std::size_t lamp, std::uint64_t photon, Flight& flight) const {
+    const lights::Emission birth =
+        m_lights[lamp]->emit(m_bounds, Vec4f(m_sequence(photon, 1), m_sequence(photon, 2),
+                                             m_sequence(photon, 3), m_sequence(photon, 4)));
+    flight.light = static_cast<std::uint32_t>(lamp);
+    flight.power = birth.power;
+    const Segment inside = clipToMedium(m_medium, birth.origin, birth.direction,
+                                        std::numeric_limits<double>::infinity());
+    flight.origin = inside.origin;
+    flight.direction = inside.direction;
+    flight.length = inside.length;
+  }
+
+  const Medium& m_medium;
+  const LightList& m_lights;
+  lights::BoundingSphere m_bounds;
+  SourceChoice m_choice;
+  BirthSequence m_sequence;
 };
 
 // Follows one photon from its entry into the bounds to its end.
@@ -147,16 +215,18 @@ lights::BoundingSphere boundingSphere(const Medium& medium) {
   return {medium.bounds().center(), 0.5 * glm::length(medium.bounds().extent()) * (1 + 1e-6)};
 }
 
+double sharedPower(const Medium& medium, const LightList& lights) {
+  return medium.bounds().empty() ? 0.0 : SourceChoice(medium, lights).total();
+}
+
 TraceStatistics tracePhotons(const Medium& medium, const LightList& lights,
                              const TraceOptions& options, FlightSink& sink) {
   TraceStatistics total;
-  const lights::BoundingSphere bounds = boundingSphere(medium);
-  if (!(bounds.radius > 0) || lights.empty()) return total;
-  const LightChoice choice(lights, bounds);
-  if (choice.dark()) return total;
+  if (medium.bounds().empty()) return total;
+  const Births births(medium, lights, options.key);
+  if (births.dark()) return total;
   const std::uint64_t first = std::min(options.firstPhoton, options.photons);
   const std::uint64_t count = std::min(options.photonCount, options.photons - first);
-  const BirthSequence births(options.key);
   const std::uint64_t chunks = (count + kPhotonsPerChunk - 1) / kPhotonsPerChunk;
   std::vector<TraceStatistics> parts(chunks);
   Progress progress("trace", count);
@@ -170,26 +240,16 @@ TraceStatistics tracePhotons(const Medium& medium, const LightList& lights,
       const std::uint64_t end = std::min(begin + kPhotonsPerChunk, first + count);
       for (std::uint64_t photon = begin; photon < end; ++photon) {
         Rng rng(options.key, RandomStream::photon, photon);
-        const std::size_t light = choice.choose(births(photon, 0));
-        const lights::Emission birth = lights[light]->emit(
-            bounds,
-            Vec4f(births(photon, 1), births(photon, 2), births(photon, 3), births(photon, 4)));
-        Flight flight;
-        flight.power = birth.power / static_cast<float>(choice.probability(light));
-        flight.photon = photon;
-        flight.light = static_cast<std::uint32_t>(light);
+        const Flight flight = births(photon, rng);
+        const bool born = flight.light == kEmittedBySmoke;
         ++stats.photons;
+        stats.born += born ? 1 : 0;
         stats.emitted += Vec3d(flight.power);
-        const Segment inside = clipToMedium(medium, birth.origin, birth.direction,
-                                            std::numeric_limits<double>::infinity());
-        if (!(inside.length > 0.0f)) {
+        // What is born at the very edge still leaves from inside.
+        if (flight.length > 0.0f || born)
+          follow(medium, flight, rng, batch, stats, counters);
+        else
           stats.missed += Vec3d(flight.power);
-          continue;
-        }
-        flight.origin = inside.origin;
-        flight.direction = inside.direction;
-        flight.length = inside.length;
-        follow(medium, flight, rng, batch, stats, counters);
       }
       stats.majorantViolations += counters.majorantViolations;
       progress.add(end - begin);

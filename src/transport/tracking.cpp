@@ -17,6 +17,7 @@ Segment clipToMedium(const Medium& medium, const Vec3d& origin, const Vec3f& dir
 
 float marchOpticalDepth(const Medium& medium, const Vec3f& o, const Vec3f& d, float length,
                         float step) {
+  const Medium::AlongRay extinction(medium, o, d);
   double depth = 0.0;
   for (volume::MajorantGrid::Walk walk(medium.majorants(), o, d, 0.0f, length); !walk.done();
        walk.advance()) {
@@ -28,7 +29,7 @@ float marchOpticalDepth(const Medium& medium, const Vec3f& o, const Vec3f& d, fl
     const float h = span / static_cast<float>(n);
     float sum = 0.0f;
     for (int i = 0; i < n; ++i)
-      sum += medium.extinction(o + d * (begin + (static_cast<float>(i) + 0.5f) * h));
+      sum += extinction(begin + (static_cast<float>(i) + 0.5f) * h);
     depth += static_cast<double>(sum * h);
   }
   return static_cast<float>(depth);

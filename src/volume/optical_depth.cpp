@@ -11,7 +11,6 @@ namespace photosphere::volume {
 namespace {
 
 constexpr std::int64_t kMaxColumns = 1 << 20;
-constexpr double kTrace = 1e-3;  // of the thickest ray: thinner ones meet no smoke
 
 /// Sums of density over the voxel columns of one axis.
 class Columns {
@@ -64,11 +63,6 @@ double percentile(std::vector<double>& values, double fraction) {
   return *at;
 }
 
-double roundedToTwoDigits(double value) {
-  const double unit = std::pow(10.0, std::floor(std::log10(value)) - 1);
-  return std::round(value / unit) * unit;
-}
-
 template <class GridType>
 std::optional<OpticalDepth> measure(const GridType& grid, const Grid& handle) {
   const Box3i bounds = handle.activeBounds();
@@ -90,20 +84,24 @@ std::optional<OpticalDepth> measure(const GridType& grid, const Grid& handle) {
   for (int axis = 0; axis < 3; ++axis)
     columns[axis].collect(edge[axis], depths);
   if (depths.empty()) return std::nullopt;
-  // Solvers leave traces of 1e-30 all over their domain, which are no smoke.
   const double thickest = *std::max_element(depths.begin(), depths.end());
-  std::erase_if(depths, [&](double depth) { return depth < kTrace * thickest; });
+  std::erase_if(depths, [&](double depth) { return depth < kTraceDepth * thickest; });
   if (!std::isfinite(thickest) || depths.empty()) return std::nullopt;
   OpticalDepth result;
   result.p5 = percentile(depths, 0.05);
   result.median = percentile(depths, 0.5);
   result.p95 = percentile(depths, 0.95);
   result.meanFreePathVoxels = sum / squares / std::cbrt(edge.x * edge.y * edge.z);
-  result.suggestedScale = roundedToTwoDigits(kSmokeOpticalDepth / result.p95);
+  result.suggestedScale = roundedToTwoDigits(kSmokeDepth / result.median);
   return result;
 }
 
 }  // namespace
+
+double roundedToTwoDigits(double value) {
+  const double unit = std::pow(10.0, std::floor(std::log10(value)) - 1);
+  return std::round(value / unit) * unit;
+}
 
 std::optional<OpticalDepth> measureOpticalDepth(const Grid& grid) {
   if (!grid || !grid.isAffine()) return std::nullopt;

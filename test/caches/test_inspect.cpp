@@ -57,7 +57,7 @@ TEST_F(Inspect, MeasuresOpticalDepthOfABlock) {
   EXPECT_NEAR(grid.opticalDepth->median, 0.5, 1e-6);
   EXPECT_NEAR(grid.opticalDepth->p95, 2.0, 1e-6);
   EXPECT_NEAR(grid.opticalDepth->meanFreePathVoxels, 2 / 0.1, 1e-4);
-  EXPECT_DOUBLE_EQ(grid.opticalDepth->suggestedScale, 2.5);
+  EXPECT_DOUBLE_EQ(grid.opticalDepth->suggestedScale, 10);
   EXPECT_TRUE(report.sound()) << formatText(report);
 }
 

@@ -319,7 +319,6 @@ const Refusal kRefusals[] = {
     {"Shard", {"trace", "scene.toml", "-o", "x.####.vdb", "--shard", "1/2"}, 2, "not served"},
     {"Plan", {"plan", "scene.toml"}, 2, "not served"},
     {"Merge", {"merge", "a.vdb", "b.vdb", "-o", "c.vdb"}, 2, "not served"},
-    {"Study", {"study", "scene.toml", "-o", "report/"}, 2, "not served"},
     {"CacheMissing", {"render", "scene.toml", "-o", "x.exr", "--frames", "9"}, 3, "smoke.0009.vdb"},
     {"GridMissing",
      {"render", "scene.toml", "-o", "x.exr", "--frames", "1", "-s", "volume.0.density=smog"},

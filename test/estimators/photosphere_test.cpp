@@ -25,19 +25,6 @@ using estimators::LightFieldLayout;
 constexpr int kPixels = 64;
 constexpr std::uint64_t kManyPhotons = kSanitized ? 5'000 : 1'000'000;
 
-// Particles spread over the smoke in proportion to its extinction, as `convert` seeds them.
-std::vector<Vec3f> seedParticles(const transport::Medium& medium, std::size_t count) {
-  std::vector<Vec3f> particles;
-  Rng rng(RandomKey::fromSeed(3, 0), RandomStream::particles, 0);
-  const Vec3f low(medium.bounds().min), extent(medium.bounds().extent());
-  const float largest = medium.majorants().maximum();
-  while (particles.size() < count) {
-    const Vec3f p = low + extent * Vec3f(rng.uniform(), rng.uniform(), rng.uniform());
-    if (rng.uniform() * largest < medium.extinction(p)) particles.push_back(p);
-  }
-  return particles;
-}
-
 // A scene with its path-traced truth in two independent halves.
 struct Judged {
   TestScene scene;
@@ -64,10 +51,14 @@ struct AgreementCase {
   Basis basis;
 };
 
+const char* nameOf(Basis basis) {
+  return basis == Basis::view ? "view" : basis == Basis::histogram ? "histogram" : "harmonics";
+}
+
 // What GoogleTest prints of a case.
 std::ostream& operator<<(std::ostream& out, const AgreementCase& c) {
-  return out << c.scene << (c.carrier == Carrier::voxels ? " voxels" : " particles")
-             << (c.basis == Basis::view ? " view" : " histogram");
+  return out << c.scene << (c.carrier == Carrier::voxels ? " voxels" : " particles") << ' '
+             << nameOf(c.basis);
 }
 
 class Agreement : public testing::TestWithParam<AgreementCase> {};
@@ -78,6 +69,7 @@ TEST_P(Agreement, WithPathTracing) {
   LightFieldLayout layout;
   layout.carrier = c.carrier;
   layout.basis = c.basis;
+  layout.order = 8;
   layout.channels = 1;
   const PhotosphereFrame frame = renderPhotosphere(j.scene, layout, kManyPhotons, 5);
   const LayerError total =
@@ -101,10 +93,12 @@ INSTANTIATE_TEST_SUITE_P(
     Scenes, Agreement,
     testing::Values(AgreementCase{"sphere", Carrier::voxels, Basis::view},
                     AgreementCase{"sphere", Carrier::voxels, Basis::histogram},
+                    AgreementCase{"sphere", Carrier::voxels, Basis::sphericalHarmonics},
                     AgreementCase{"sphere", Carrier::particles, Basis::view},
                     AgreementCase{"sphere", Carrier::particles, Basis::histogram},
                     AgreementCase{"plume", Carrier::voxels, Basis::view},
                     AgreementCase{"plume", Carrier::voxels, Basis::histogram},
+                    AgreementCase{"plume", Carrier::voxels, Basis::sphericalHarmonics},
                     AgreementCase{"plume", Carrier::particles, Basis::view},
                     AgreementCase{"plume", Carrier::particles, Basis::histogram},
                     AgreementCase{"column", Carrier::voxels, Basis::view},
@@ -113,7 +107,7 @@ INSTANTIATE_TEST_SUITE_P(
                     AgreementCase{"column", Carrier::particles, Basis::histogram}),
     [](const auto& row) {
       return row.param.scene + (row.param.carrier == Carrier::voxels ? "_voxels" : "_particles") +
-             (row.param.basis == Basis::view ? "_view" : "_histogram");
+             '_' + nameOf(row.param.basis);
     });
 
 // Albedo 1 in surroundings of radiance 1: every pixel is 1.
@@ -132,24 +126,11 @@ TEST_P(Furnace, IsOneEverywhere) {
   layout.channels = 1;
   layout.unscattered = true;
   const PhotosphereFrame frame = renderPhotosphere(scene, layout, kManyPhotons, 5);
-  double mean = 0;
-  for (const Rgb& c : frame.layers.beauty)
-    mean += static_cast<double>(c.y);
-  mean /= static_cast<double>(frame.layers.beauty.size());
-  double worst = 0;
-  for (int by = 0; by < kPixels; by += 8)
-    for (int bx = 0; bx < kPixels; bx += 8) {
-      double block = 0;
-      for (int y = by; y < by + 8; ++y)
-        for (int x = bx; x < bx + 8; ++x)
-          block +=
-              static_cast<double>(frame.layers.beauty[static_cast<std::size_t>(y * kPixels + x)].y);
-      worst = std::max(worst, std::abs(block / 64 - 1));
-    }
-  std::printf("  mean %.5f, worst block off by %.4f\n", mean, worst);
+  const BlockDeviation off = deviationFromOne(frame.layers.beauty, kPixels, 8);
+  std::printf("  mean %.5f, worst block off by %.4f\n", off.mean, off.worst);
   if (kSanitized) return;
-  EXPECT_NEAR(mean, 1.0, 0.005);
-  EXPECT_LT(worst, 0.03);
+  EXPECT_NEAR(off.mean, 1.0, 0.005);
+  EXPECT_LT(off.worst, 0.03);
 }
 
 INSTANTIATE_TEST_SUITE_P(Carriers, Furnace,

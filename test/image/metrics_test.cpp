@@ -152,6 +152,19 @@ TEST(CompareImages, cropsAreComparedWhereTheyOverlapWhenAllowed) {
   EXPECT_THROW(compareImages(makeGrey({200, 0, 4, 4}, 1), whole, options), ConfigError);
 }
 
+// Far and finite where a ray met nothing: such pixels would drown the others.
+TEST(CompareImages, depthIsComparedWhereEitherMetSomething) {
+  Image a(4, 1), b(4, 1);
+  const auto za = a.addChannel("Z"), zb = b.addChannel("Z");
+  const float depthsA[] = {2.0f, 1e10f, 1e10f, 5.0f}, depthsB[] = {2.5f, 1e10f, 1e10f, 5.0f};
+  std::copy(depthsA, depthsA + 4, za.begin());
+  std::copy(depthsB, depthsB + 4, zb.begin());
+  const ErrorMetrics z = compareImages(a, b).layers[0].all;
+  EXPECT_EQ(z.pixels, 2u);
+  EXPECT_NEAR(z.meanReference, 3.75, 1e-6);
+  EXPECT_NEAR(z.rmse, 0.5 / std::sqrt(2.0), 1e-6);
+}
+
 TEST(CompareImages, nothingInCommonIsAnError) {
   Image a(2, 2), b(2, 2);
   a.addChannel("Z");

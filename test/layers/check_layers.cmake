@@ -6,7 +6,7 @@ set(violations "")
 # "start of the include:module|module". A semicolon inside an entry would end it: CMake flattens lists.
 set(rooms
   "OpenEXR/:image" "Imath:image" "OpenImageIO/:image" "OpenColorIO/:image" "toml[+][+]/:scene"
-  "CLI/:cli" "nlohmann/:caches|scene|cli" "zlib:caches" "tbb/:core|volume" "Random123/:core"
+  "CLI/:cli" "nlohmann/:caches|scene|study|cli" "zlib:caches" "tbb/:core|volume" "Random123/:core"
   "openvdb/:volume" "spdlog/:core" "nanoflann:volume|estimators")
 foreach(row IN LISTS rows)
   if(NOT row MATCHES "^([a-z]+): ?(.*)$")

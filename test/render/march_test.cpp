@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <ostream>
 
 #include "support/frames.h"
 #include "support/support.h"
@@ -57,6 +58,80 @@ TEST_P(BoxSingle, MatchesTheClosedForm) {
 
 INSTANTIATE_TEST_SUITE_P(Shadows, BoxSingle,
                          testing::Values(ShadowMode::grid, ShadowMode::march, ShadowMode::track));
+
+struct LampCase {
+  const char* name;
+  const char* type;
+  std::vector<std::pair<std::string, std::string>> options;
+};
+void PrintTo(const LampCase& c, std::ostream* out) {
+  *out << c.name;
+}
+
+class TabulatedShadow : public testing::TestWithParam<LampCase> {};
+
+// Smooth smoke, so that the table's interpolation is all that differs from a fine march.
+TEST_P(TabulatedShadow, AgreesWithAFineMarch) {
+  const int cells = kSanitized ? 24 : 48;
+  const transport::Medium medium =
+      makeMedium(sampledVolume(2.0, cells, {0.8, 0.0, 6.0}, [](const Vec3d& p) {
+        const double r = glm::length(p - Vec3d(0.2, -0.1, 0.1));
+        return std::max(0.0, 1 - 1.3 * r * r) + std::max(0.0, 0.4 - 2 * glm::length(p + 0.55));
+      }));
+  transport::LightList lights;
+  lights.push_back(makeLight(GetParam().type, GetParam().options));
+  const float voxel = static_cast<float>(medium.voxelEdge());
+  const render::Shadows table(medium, lights, ShadowMode::grid, voxel, 0);
+  const render::Shadows march(medium, lights, ShadowMode::march, voxel / 8, 0);
+  EXPECT_GT(table.memoryBytes(), 0u);
+  Rng rng(RandomKey::fromSeed(8, 0), RandomStream::test, 0);
+  transport::TrackingCounters counters;
+  double squares = 0, difference = 0, sum = 0;
+  const int count = 4000;
+  for (int i = 0; i < count;) {
+    const Vec3f p =
+        Vec3f(medium.bounds().min) +
+        Vec3f(medium.bounds().extent()) * Vec3f(rng.uniform(), rng.uniform(), rng.uniform());
+    if (!(medium.extinction(p) > 0.0f)) continue;
+    ++i;
+    const lights::Illumination in = lights[0]->illuminate(p, Vec2f(0.5f));
+    const auto at = [&](const render::Shadows& shadows) {
+      return static_cast<double>(
+          shadows.transmittance(0, p, in.direction, in.distance, rng, counters));
+    };
+    const double t = at(table), exact = at(march);
+    ASSERT_NEAR(t, exact, 0.03) << p.x << " " << p.y << " " << p.z;
+    squares += (t - exact) * (t - exact);
+    difference += t - exact;
+    sum += exact;
+  }
+  EXPECT_LT(std::sqrt(squares / count), 0.005);
+  EXPECT_NEAR(difference / sum, 0.0, 0.003);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Lamps, TabulatedShadow,
+    testing::Values(LampCase{"sun", "directional", {{"position", "[3, 1, 2]"}}},
+                    LampCase{"sun_along_an_axis", "directional", {{"position", "[0, 0, -1]"}}},
+                    LampCase{"star", "point", {{"position", "[2e6, -1e6, 3e6]"}}},
+                    LampCase{"lamp_beside", "point", {{"position", "[0.3, 1.9, -0.4]"}}},
+                    LampCase{"spot", "spot", {{"position", "[-3, 2, 2]"}, {"cone_angle", "60"}}},
+                    LampCase{"lamp_inside", "point", {{"position", "[0.2, 0.1, 0.3]"}}}),
+    [](const auto& info) { return std::string(info.param.name); });
+
+// What lies beyond the budget is marched: the same light, no memory.
+TEST(Shadows, GridPastTheBudgetIsMarched) {
+  const transport::Medium medium = makeMedium(boxVolume(Vec3d(2.0), Vec3i(16), {0.8, 0.0, 1.5}));
+  transport::LightList lights;
+  lights.push_back(makeLight("directional", {{"position", "[0, 0, 1]"}}));
+  const render::Shadows shadows(medium, lights, ShadowMode::grid, 0.1f, 1);
+  EXPECT_EQ(shadows.memoryBytes(), 0u);
+  Rng rng(RandomKey::fromSeed(1, 0), RandomStream::test, 0);
+  transport::TrackingCounters counters;
+  EXPECT_NEAR(
+      shadows.transmittance(0, Vec3f(0.1f, 0.2f, 0.0f), Vec3f(0, 0, -1), kInfinity, rng, counters),
+      std::exp(-1.5f), 1e-4f);
+}
 
 TEST(March, TransmittanceDoesNotDependOnTheStep) {
   const transport::Medium medium = makeMedium(boxVolume(Vec3d(2.0), Vec3i(16), {0.8, 0.0, 1.5}));

@@ -180,12 +180,7 @@ TEST_P(NotServedTest, IsRefusedAndSaysSo) {
 
 INSTANTIATE_TEST_SUITE_P(
     Contract, NotServedTest,
-    ::testing::Values("estimator.preset=paper", "estimator.basis=spherical_harmonics",
-                      "estimator.direction=barycentric", "estimator.direction=kernel",
-                      "estimator.representative=mean", "estimator.merge=sampled",
-                      "estimator.evaluate=per_step", "estimator.final_gather=4",
-                      "estimator.order=6", "volume.0.emission={ grid = \"flame\" }",
-                      "volume.0.velocity=v", "volume.0.density_scale=[1, 2, 3]",
+    ::testing::Values("volume.0.velocity=v", "volume.0.density_scale=[1, 2, 3]",
                       "volume.0.phase={ type = \"rayleigh\" }",
                       "volume.0.phase={ type = \"draine\" }",
                       "volume.0.phase={ type = \"mie_fog\" }",
@@ -193,8 +188,8 @@ INSTANTIATE_TEST_SUITE_P(
                       "light.0.type=disk", "light.0.type=sphere", "light.0.size=[2, 2]",
                       "light.0.radius=0.5", "camera.type=equirectangular", "camera.file=shot.chan",
                       "camera.fstop=2.8", "camera.position=[{ frame = 1, value = [0, 0, 5] }]",
-                      "output.deep=deep.exr", "output.light_groups=true", "effects.emission=on",
-                      "effects.motion_blur=on", "effects.depth_of_field=on"));
+                      "output.deep=deep.exr", "output.light_groups=true", "effects.motion_blur=on",
+                      "effects.depth_of_field=on"));
 
 TEST(SceneFileTest, AnEnvironmentFileIsNotServed) {
   EXPECT_TRUE(

@@ -103,6 +103,21 @@ TEST(Partition, IsExactAtPolesEdgesAndSignedZeros) {
   }
 }
 
+// Cells far smaller than any histogram has: floats still tell them apart.
+TEST(Partition, InvertsFineCells) {
+  for (const int n : {64, 255, 1024}) {
+    const Partition p(n);
+    Rng rng(RandomKey::fromSeed(4, 0), RandomStream::test, 0);
+    for (int i = 0; i < 20000; ++i) {
+      const int cell = std::min(p.size() - 1, static_cast<int>(rng.uniformDouble() * p.size()));
+      ASSERT_EQ(p.index(p.center(cell)), cell) << n << " rows";
+    }
+    EXPECT_EQ(p.index(Vec3f(0)), 0);
+    EXPECT_EQ(p.index({0, 0, -1}), 4 * n * n);
+    EXPECT_EQ(p.index({0, -1, 0}), 3 * n * n - 1);
+  }
+}
+
 TEST(Partition, RefusesImpossibleRows) {
   EXPECT_THROW(Partition(0), ConfigError);
   EXPECT_THROW(Partition(-3), ConfigError);

@@ -17,14 +17,16 @@ render::FrameOptions frameOptions(const TestScene& scene, int samples, std::uint
 
 // Marches a source that is ready.
 void marchFrame(const TestScene& scene, const estimators::InscatterSource& source,
-                std::uint64_t seed, int samples, PhotosphereFrame& frame) {
+                std::uint64_t seed, int samples, int gatherRays, PhotosphereFrame& frame) {
   const Stopwatch shadowWatch;
   const auto edge = static_cast<float>(scene.medium->voxelEdge());
   const render::Shadows shadows(*scene.medium, scene.lights, render::ShadowMode::grid, edge, 0);
   frame.resolveSeconds += shadowWatch.seconds();
   const Stopwatch march;
+  render::MarchOptions marching;
+  marching.gatherRays = gatherRays;
   const auto integrator =
-      render::makeMarchIntegrator(*scene.medium, scene.lights, shadows, &source, {});
+      render::makeMarchIntegrator(*scene.medium, scene.lights, shadows, &source, marching);
   frame.layers =
       render::renderFrame(*scene.camera, *integrator, frameOptions(scene, samples, seed + 1000));
   frame.marchSeconds = march.seconds();
@@ -85,13 +87,26 @@ TestScene plumeScene(double g, int cells, int pixels) {
   return scene;
 }
 
+std::vector<Vec3f> seedParticles(const transport::Medium& medium, std::size_t count) {
+  std::vector<Vec3f> particles;
+  Rng rng(RandomKey::fromSeed(3, 0), RandomStream::particles, 0);
+  const Vec3f low(medium.bounds().min), extent(medium.bounds().extent());
+  const float largest = medium.majorants().maximum();
+  while (particles.size() < count) {
+    const Vec3f p = low + extent * Vec3f(rng.uniform(), rng.uniform(), rng.uniform());
+    if (rng.uniform() * largest < medium.extinction(p)) particles.push_back(p);
+  }
+  return particles;
+}
+
 render::FrameLayers renderPath(const TestScene& scene, int samples, std::uint64_t seed) {
   const auto path = render::makePathIntegrator(*scene.medium, scene.lights, {});
   return render::renderFrame(*scene.camera, *path, frameOptions(scene, samples, seed));
 }
 
 PhotosphereFrame renderPhotosphere(const TestScene& scene, estimators::LightFieldLayout layout,
-                                   std::uint64_t photons, std::uint64_t seed, int samples) {
+                                   std::uint64_t photons, std::uint64_t seed, int samples,
+                                   int gatherRays) {
   PhotosphereFrame frame;
   layout.phases = static_cast<int>(scene.medium->phases().size());
   if (layout.radius == 0) layout.radius = automaticRadius(*scene.medium, layout, photons);
@@ -105,9 +120,10 @@ PhotosphereFrame renderPhotosphere(const TestScene& scene, estimators::LightFiel
                                   scene.particles, options, frame.statistics);
   frame.traceSeconds = trace.seconds();
   Stopwatch resolveWatch;
-  const auto source = estimators::resolve(*scene.medium, field, scene.view());
+  const auto source = estimators::resolve(*scene.medium, field, scene.view(), options.key);
+  frame.clampedShare = source->clampedShare();
   frame.resolveSeconds = resolveWatch.seconds();
-  marchFrame(scene, *source, seed, samples, frame);
+  marchFrame(scene, *source, seed, samples, gatherRays, frame);
   return frame;
 }
 
@@ -125,8 +141,23 @@ PhotosphereFrame renderPhotonMap(const TestScene& scene, estimators::PhotonMapLa
   const auto map =
       estimators::tracePhotonMap(*scene.medium, scene.lights, layout, options, frame.statistics);
   frame.traceSeconds = trace.seconds();
-  marchFrame(scene, *map, seed, samples, frame);
+  marchFrame(scene, *map, seed, samples, 0, frame);
   return frame;
+}
+
+BlockDeviation deviationFromOne(const std::vector<Rgb>& image, int width, int block) {
+  const int height = static_cast<int>(image.size()) / width;
+  BlockDeviation off;
+  for (int by = 0; by < height; by += block)
+    for (int bx = 0; bx < width; bx += block) {
+      double sum = 0;
+      for (int y = by; y < by + block; ++y)
+        for (int x = bx; x < bx + block; ++x)
+          sum += static_cast<double>(image[static_cast<std::size_t>(y * width + x)].y);
+      off.mean += sum / static_cast<double>(image.size());
+      off.worst = std::max(off.worst, std::abs(sum / (block * block) - 1));
+    }
+  return off;
 }
 
 LayerError layerError(const std::vector<Rgb>& image, const std::vector<Rgb>& referenceA,

@@ -29,6 +29,9 @@ TestScene sphereScene(double tau, double albedo, double g, int cells, int pixels
 /// Fractal plume in a unit cube, lit by a spot from above and the side.
 TestScene plumeScene(double g, int cells, int pixels);
 
+/// Particles spread over the smoke in proportion to its extinction, as `convert` seeds them.
+std::vector<Vec3f> seedParticles(const transport::Medium& medium, std::size_t count);
+
 /// A frame rendered by path tracing.
 render::FrameLayers renderPath(const TestScene& scene, int samples, std::uint64_t seed);
 
@@ -36,10 +39,13 @@ struct PhotosphereFrame {
   render::FrameLayers layers;
   transport::TraceStatistics statistics;
   double traceSeconds = 0, resolveSeconds = 0, marchSeconds = 0;
+  double clampedShare = 0;
 };
 /// A frame rendered by the photosphere; layout.radius 0 = automatic.
+/// @param gatherRays  final gathering, rays of each camera sample
 PhotosphereFrame renderPhotosphere(const TestScene& scene, estimators::LightFieldLayout layout,
-                                   std::uint64_t photons, std::uint64_t seed, int samples = 4);
+                                   std::uint64_t photons, std::uint64_t seed, int samples = 4,
+                                   int gatherRays = 0);
 
 /// A frame rendered by a photon map of one pass; layout.radius 0 = automatic. Tracing and building
 /// the map count as `traceSeconds`.
@@ -53,5 +59,12 @@ struct LayerError {
 LayerError layerError(const std::vector<Rgb>& image, const std::vector<Rgb>& referenceA,
                       const std::vector<Rgb>& referenceB, const std::vector<Rgb>& transmittance,
                       int width);
+
+/// Mean of an image, and how far the worst square block's mean is from 1: what a furnace is judged
+/// by.
+struct BlockDeviation {
+  double mean = 0, worst = 0;
+};
+BlockDeviation deviationFromOne(const std::vector<Rgb>& image, int width, int block);
 
 }  // namespace photosphere::test

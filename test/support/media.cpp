@@ -35,6 +35,17 @@ Mat4d placement(const Vec3d& size, const Vec3i& cells) {
   return m;
 }
 
+template <class T, class At>
+volume::BrickField<T> sampleNodes(int cells, const Mat4d& localFromNode, const At& at) {
+  const Vec3i bricks(cells / 8);
+  return {Vec3i(0), bricks, allBricks(bricks), [&](const Vec3i& brick, T* nodes) {
+            for (int z = 0; z < 9; ++z)
+              for (int y = 0; y < 9; ++y)
+                for (int x = 0; x < 9; ++x)
+                  *nodes++ = at(transformPoint(localFromNode, Vec3d(brick * 8 + Vec3i(x, y, z))));
+          }};
+}
+
 // Smooth value noise of unit lattice, in [0, 1].
 double valueNoise(const Vec3d& p, unsigned seed) {
   const Vec3d base = glm::floor(p);
@@ -75,16 +86,19 @@ MediumVolume boxVolume(const Vec3d& size, const Vec3i& cells, const MediumOption
 MediumVolume sampledVolume(double edge, int cells, const MediumOptions& options,
                            const std::function<double(const Vec3d&)>& density) {
   MediumVolume v = withOptions(options);
-  const Vec3i bricks(cells / 8);
   v.localFromNode = placement(Vec3d(edge), Vec3i(cells));
-  v.density = Field(Vec3i(0), bricks, allBricks(bricks), [&](const Vec3i& brick, float* nodes) {
-    for (int z = 0; z < 9; ++z)
-      for (int y = 0; y < 9; ++y)
-        for (int x = 0; x < 9; ++x)
-          *nodes++ = static_cast<float>(
-              density(transformPoint(v.localFromNode, Vec3d(brick * 8 + Vec3i(x, y, z)))));
-  });
+  v.density = sampleNodes<float>(cells, v.localFromNode,
+                                 [&](const Vec3d& p) { return static_cast<float>(density(p)); });
   return v;
+}
+
+transport::VolumeEmission sampledEmission(double edge, int cells,
+                                          const std::function<Rgb(const Vec3d&)>& j) {
+  transport::VolumeEmission e;
+  e.localFromNode = placement(Vec3d(edge), Vec3i(cells));
+  e.field = sampleNodes<Vec4f>(cells, e.localFromNode,
+                               [&](const Vec3d& p) { return transport::emissionNode(j(p)); });
+  return e;
 }
 
 double plumeDensity(const Vec3d& p) {

@@ -23,6 +23,11 @@ transport::MediumVolume boxVolume(const Vec3d& size, const Vec3i& cells,
 transport::MediumVolume sampledVolume(double edge, int cells, const MediumOptions& options,
                                       const std::function<double(const Vec3d&)>& density);
 
+/// Emission sampled at the nodes of the lattice that `sampledVolume` has, or that `boxVolume` has
+/// for a cube. @param j  [W m^-3 sr^-1]
+transport::VolumeEmission sampledEmission(double edge, int cells,
+                                          const std::function<Rgb(const Vec3d&)>& j);
+
 /// Density of a fractal plume in a unit cube about the origin: a rising, widening column eaten away
 /// by value noise. Largest value about 1.
 double plumeDensity(const Vec3d& p);

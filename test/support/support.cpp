@@ -72,6 +72,8 @@ RunResult run(const std::vector<std::string>& command, const fs::path& workingFo
   result.exitCode = WIFSIGNALED(status) ? 128 + WTERMSIG(status) : WEXITSTATUS(status);
   result.out = readText(out);
   result.err = readText(err);
+  for (const char* report : {"ERROR: AddressSanitizer", "runtime error: "})
+    if (result.err.find(report) != std::string::npos) ADD_FAILURE() << result.err;
   return result;
 }
 

@@ -20,6 +20,10 @@ inline constexpr bool kSanitized = true;
 inline constexpr bool kSanitized = false;
 #endif
 
+/// What a program ends with after the report of a sanitizer (CMakePresets.json, test preset
+/// `asan`): none of photosphere's own exit codes.
+inline constexpr int kSanitizerExit = 99;
+
 /// A folder of its own that disappears with the object.
 class TemporaryFolder {
  public:
@@ -47,7 +51,8 @@ struct RunResult {
   std::string out;
   std::string err;
 };
-/// Runs the photosphere program with these arguments (no shell).
+/// Runs the photosphere program with these arguments (no shell). The test fails, whatever exit code
+/// it expects, when a sanitizer reports something.
 RunResult runTool(const std::vector<std::string>& arguments,
                   const std::filesystem::path& workingFolder = {});
 /// Runs a command line through /bin/sh.

@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <cmath>
+#include <ostream>
 
 #include "photosphere/core/sampling.h"
 #include "photosphere/transport/photon_tracer.h"
@@ -65,6 +66,9 @@ struct SlabCase {
   std::string illumination;
   double tau, albedo, g;
 };
+void PrintTo(const SlabCase& c, std::ostream* out) {
+  *out << c.illumination << " tau " << c.tau << " albedo " << c.albedo << " g " << c.g;
+}
 
 class Slab : public testing::TestWithParam<SlabCase> {};
 
@@ -114,8 +118,7 @@ TEST(PhotonTracer, ColouredPowersAddUp) {
 std::vector<SlabCase> cases() {
   std::vector<SlabCase> all;
   for (const SlabRow& row : slabTable())
-    if (row.quantity == "R" && row.tau <= 8 && (row.illumination == "beam" || row.tau == 2))
-      all.push_back({row.illumination, row.tau, row.albedo, row.g});
+    if (row.quantity == "R") all.push_back({row.illumination, row.tau, row.albedo, row.g});
   return all;
 }
 

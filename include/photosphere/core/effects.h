@@ -4,7 +4,7 @@
 namespace photosphere {
 
 struct Effects {
-  bool emission = false;
+  bool emission = true;
   bool singleScattering = true;
   bool multipleScattering = true;
   bool shadows = true;

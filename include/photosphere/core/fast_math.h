@@ -20,16 +20,14 @@ inline float fastExp(float x) {
   const float n = shifted - 12582912.0f;
   float r = x - n * 0.693359375f;
   r = r - n * -2.12194440e-4f;
-  float p = 1.9875691500e-4f;
-  p = p * r + 1.3981999507e-3f;
-  p = p * r + 8.3334519073e-3f;
-  p = p * r + 4.1665795894e-2f;
-  p = p * r + 1.6666665459e-1f;
-  p = p * r + 5.0000001201e-1f;
-  p = p * r * r + r + 1.0f;
+  const float z = r * r;
+  const float low = 1.6666665459e-1f * r + 5.0000001201e-1f;
+  const float middle = 8.3334519073e-3f * r + 4.1665795894e-2f;
+  const float high = 1.9875691500e-4f * r + 1.3981999507e-3f;
+  const float p = (low + z * (middle + z * high)) * z + r + 1.0f;
   const int k = static_cast<int>(n);
   // Two factors keep 2^k representable at both ends of the range.
-  const int half = k / 2;
+  const int half = k >> 1;
   const float a = std::bit_cast<float>(static_cast<std::uint32_t>(half + 127) << 23);
   const float b = std::bit_cast<float>(static_cast<std::uint32_t>(k - half + 127) << 23);
   return p * a * b;
@@ -38,27 +36,20 @@ inline float fastExp(float x) {
 /// Natural logarithm of a positive normal float, absolute error below 1e-7 (relative near 1).
 /// Zero and denormals give about -87.3, negative values are not allowed.
 inline float fastLog(float x) {
-  std::uint32_t bits = std::bit_cast<std::uint32_t>(x < 1.17549435e-38f ? 1.17549435e-38f : x);
-  int e = static_cast<int>(bits >> 23) - 126;
-  float m = std::bit_cast<float>((bits & 0x007fffffu) | 0x3f000000u);  // [0.5, 1)
-  if (m < 0.707106781186547524f) {
-    e -= 1;
-    m = m + m - 1.0f;
-  } else {
-    m = m - 1.0f;
-  }
+  const std::uint32_t bits =
+      std::bit_cast<std::uint32_t>(x < 1.17549435e-38f ? 1.17549435e-38f : x);
+  // Exponent and mantissa in [sqrt(1/2), sqrt(2)), without a branch on the mantissa.
+  const std::int32_t e = static_cast<std::int32_t>(bits - 0x3f3504f3u) >> 23;
+  const float m = std::bit_cast<float>(bits - (static_cast<std::uint32_t>(e) << 23)) - 1.0f;
+  // The series in pairs (Estrin), so that its terms need not wait for one another.
   const float z = m * m;
-  float p = 7.0376836292e-2f;
-  p = p * m - 1.1514610310e-1f;
-  p = p * m + 1.1676998740e-1f;
-  p = p * m - 1.2420140846e-1f;
-  p = p * m + 1.4249322787e-1f;
-  p = p * m - 1.6668057665e-1f;
-  p = p * m + 2.0000714765e-1f;
-  p = p * m - 2.4999993993e-1f;
-  p = p * m + 3.3333331174e-1f;
+  const float w = z * z;
+  const float low =
+      (-2.4999993993e-1f * m + 3.3333331174e-1f) + z * (-1.6668057665e-1f * m + 2.0000714765e-1f);
+  const float high = (-1.2420140846e-1f * m + 1.4249322787e-1f) +
+                     z * (-1.1514610310e-1f * m + 1.1676998740e-1f) + w * 7.0376836292e-2f;
   const float fe = static_cast<float>(e);
-  float y = p * m * z;
+  float y = (low + w * high) * m * z;
   y = y + fe * -2.12194440e-4f;
   y = y - 0.5f * z;
   return m + y + fe * 0.693359375f;
@@ -70,27 +61,19 @@ struct SinCos {
 };
 inline SinCos fastSinCosTurns(float turns) {
   const float scaled = turns * 4.0f;
-  const float quadrant = std::floor(scaled + 0.5f);
-  const float r = (scaled - quadrant) * 1.57079632679489662f;  // [-pi/4, pi/4]
+  const int quadrant = static_cast<int>(scaled + 0.5f);
+  const float r = (scaled - static_cast<float>(quadrant)) * 1.57079632679489662f;  // +-pi/4
   const float z = r * r;
-  float s = -1.9515295891e-4f;
-  s = s * z + 8.3321608736e-3f;
-  s = s * z - 1.6666654611e-1f;
-  s = s * z * r + r;
-  float c = 2.443315711809948e-5f;
-  c = c * z - 1.388731625493765e-3f;
-  c = c * z + 4.166664568298827e-2f;
-  c = c * z * z - 0.5f * z + 1.0f;
-  switch (static_cast<int>(quadrant) & 3) {
-    case 0:
-      return {s, c};
-    case 1:
-      return {c, -s};
-    case 2:
-      return {-s, -c};
-    default:
-      return {-c, s};
-  }
+  const float s = ((-1.9515295891e-4f * z + 8.3321608736e-3f) * z - 1.6666654611e-1f) * z * r + r;
+  const float c =
+      ((2.443315711809948e-5f * z - 1.388731625493765e-3f) * z + 4.166664568298827e-2f) * z * z -
+      0.5f * z + 1.0f;
+  // Quadrants swap the two and change signs: by bits, since no predictor could guess them.
+  const auto q = static_cast<std::uint32_t>(quadrant);
+  const auto sine = std::bit_cast<std::uint32_t>(s), cosine = std::bit_cast<std::uint32_t>(c);
+  const std::uint32_t swap = (sine ^ cosine) & (0u - (q & 1u));
+  return {std::bit_cast<float>((sine ^ swap) ^ ((q & 2u) << 30)),
+          std::bit_cast<float>((cosine ^ swap) ^ (((q + 1u) & 2u) << 30))};
 }
 
 }  // namespace photosphere

@@ -12,9 +12,15 @@ namespace photosphere {
 inline std::int64_t quantize(double value, double inverseQuantum, std::uint32_t bits) {
   const double scaled = value * inverseQuantum;
   const double whole = static_cast<double>(static_cast<std::int64_t>(scaled));
-  const double fraction = scaled - whole;  // same sign as value; values here are never negative
+  const double fraction = scaled - whole;  // same sign as value, which is never negative here
   return static_cast<std::int64_t>(whole) +
          (fraction > static_cast<double>(bits) * 0x1p-32 ? 1 : 0);
+}
+
+/// The same for values of either sign: bins of directions, spherical harmonics.
+inline std::int64_t quantizeSigned(double value, double inverseQuantum, std::uint32_t bits) {
+  return value < 0 ? -quantize(-value, inverseQuantum, bits)
+                   : quantize(value, inverseQuantum, bits);
 }
 
 /// Adds to a sum that other threads may add to at the same time.

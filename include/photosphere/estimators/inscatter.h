@@ -22,6 +22,9 @@ class InscatterSource {
   /// True when the light of lamps with extent is in `Inscatter::single` and must not be sampled
   /// again.
   virtual bool carriesUnscattered() const = 0;
+  /// Light below zero that is clamped to 0, over all light that is read: the bias of a basis that
+  /// can go negative.
+  virtual double clampedShare() const { return 0.0; }
 };
 
 /// The eye that looks at the smoke, local space.

@@ -16,8 +16,10 @@ struct LightCacheKey {
 };
 
 /// Writes one point grid named `light`: a point per light voxel (at its centre) or particle, with
-/// `photon_histogram` (fluence rate [W m^-2], or power [W], per bin and channel) and
-/// `photon_energy` (its sum over bins), the sets of unscattered light under `..._unscattered`, and
+/// `photon_histogram` (fluence rate [W m^-2], or power [W], per bin and channel; in its place
+/// `photon_harmonics`, the same times Y_lm, per harmonic and channel) and
+/// `photon_energy` (its sum over bins), for representative = mean `photon_direction` (the sum of
+/// power times direction of every bin), the sets of unscattered light under `..._unscattered`, and
 /// the layout, counts and hashes as grid metadata. Whole or not at all.
 /// @throws OutputError; ConfigError for the view basis, which belongs to one camera
 void writeLightCache(const std::filesystem::path& path, const LightField& field,

@@ -9,19 +9,36 @@
 #include "photosphere/core/types.h"
 #include "photosphere/estimators/inscatter.h"
 #include "photosphere/lights/light.h"
+#include "photosphere/sphere/bin_shares.h"
 #include "photosphere/transport/photon_tracer.h"
 #include "photosphere/transport/support_lattice.h"
 
 namespace photosphere::estimators {
 
 enum class Carrier { voxels, particles };
-enum class Basis { histogram, view };
+enum class Basis { histogram, sphericalHarmonics, view };
 enum class Deposit { trackLength, collision };
 /// How a collision reaches particles (METHOD.md section 4): gather is eq. 7a, scatter eq. 7b.
 enum class EnergyRule { gather, scatter };
 enum class SpatialKernel { epanechnikov, box, gaussian };
+/// What stands for the directions of a bin (Min & Ihm 2010, figure 5).
+enum class Representative {
+  bin,   ///< the bin itself: light is spread over it
+  mean,  ///< the mean direction of what fell in the bin, kept beside it
+};
+/// Bins of a particle that a gather reads (section 4.2.2, figure 9).
+enum class Merge {
+  full,
+  sampled,  ///< one, drawn in proportion to its power and weighted so that the mean is that of
+            ///< `full`
+};
+/// When the direction toward the eye is taken.
+enum class Evaluate {
+  perView,  ///< once for each carrier
+  perStep,  ///< at every march step, as in the paper
+};
 
-/// Everything that decides what a carrier's numbers mean.
+/// Everything that decides what a carrier's numbers mean, and how they are read.
 struct LightFieldLayout {
   Carrier carrier = Carrier::voxels;
   Basis basis = Basis::view;
@@ -29,6 +46,7 @@ struct LightFieldLayout {
   EnergyRule energy = EnergyRule::gather;
   SpatialKernel kernel = SpatialKernel::epanechnikov;
   int rows = 2;      ///< 8 rows^2 direction bins (histogram)
+  int order = 4;     ///< (order + 1)^2 coefficients (sphericalHarmonics)
   int channels = 3;  ///< 1 where lights and media are grey
   int phases = 1;    ///< distinct phase functions (view)
   bool unscattered =
@@ -36,18 +54,43 @@ struct LightFieldLayout {
   double lightVoxel = 2.0;     ///< light voxel edge over density voxel edge
   double radius = 0.0;         ///< support of the spatial kernel [m]
   double depositRadius = 0.0;  ///< [m]; particles with collision deposit
+  // Histogram alone:
+  sphere::DirectionDeposit direction = sphere::DirectionDeposit::nearest;
+  Representative representative = Representative::bin;
+  Merge merge = Merge::full;  ///< particles
+  Evaluate evaluate = Evaluate::perView;
+  /// Smooths directions when they are read, or spreads them when they are deposited
+  /// (DirectionDeposit::kernel): once, not twice.
+  sphere::AngularKernel angularKernel = sphere::AngularKernel::none;
+  double bandwidth = 0.5;   ///< of angularKernel [rad]
+  double truncation = 3.0;  ///< of angularKernel [bandwidths]
+  int directions = 128;     ///< K of eq. 9, 8 n^2; Merge::sampled
 
-  int bins() const { return basis == Basis::histogram ? 8 * rows * rows : phases; }
-  /// Floats of one set (scattered, unscattered) of one carrier.
-  int setSize() const { return bins() * channels; }
+  /// Values of one set and channel: bins, coefficients, or one for each phase function.
+  int bins() const {
+    if (basis == Basis::view) return phases;
+    return basis == Basis::histogram ? 8 * rows * rows : (order + 1) * (order + 1);
+  }
+  /// Floats of one set (scattered, unscattered) of one carrier: [bin][channel], then for
+  /// Representative::mean [bin][3], the sum of power times direction.
+  int setSize() const { return bins() * (channels + (keepsMeans() ? 3 : 0)); }
   int valuesPerCarrier() const { return setSize() * (unscattered ? 2 : 1); }
+  bool keepsMeans() const {
+    return basis == Basis::histogram && representative == Representative::mean;
+  }
+  /// @throws ConfigError for a bandwidth or truncation that makes no kernel
+  sphere::SmoothingKernel smoothing() const { return {angularKernel, bandwidth, truncation}; }
+  /// How directions reach bins. @throws ConfigError for DirectionDeposit::kernel without a kernel
+  sphere::BinShares binShares() const {
+    return sphere::BinShares(sphere::Partition(rows), direction, smoothing());
+  }
   /// True when values are power [W] of collisions rather than fluence rate.
   bool holdsPower() const { return carrier == Carrier::particles && deposit == Deposit::collision; }
 };
 
 /// Values on carriers, [carrier][set][bin][channel]. Histogram: fluence rate that arrives in the
-/// bin [W m^-2], or power [W] (holdsPower). View: the same times the phase function toward the eye
-/// [1/sr].
+/// bin [W m^-2], or power [W] (holdsPower). Spherical harmonics: the same light times Y_lm of the
+/// direction it travels in. View: times the phase function toward the eye [1/sr].
 struct LightField {
   LightFieldLayout layout;
   transport::SupportLattice lattice;  ///< light voxels; the carriers themselves for Carrier::voxels
@@ -64,11 +107,15 @@ struct LightField {
   }
 };
 
+/// @throws ConfigError naming the keys of the first combination that has no meaning (METHOD.md
+/// section 4, legal combinations)
+void checkLayout(const LightFieldLayout& layout);
+
 /// Traces photons and gathers them on carriers.
 /// @param view       used by Basis::view alone
 /// @param particles  positions, local space; used by Carrier::particles alone
-/// @throws ConfigError for combinations that METHOD.md section 4 does not allow or without
-/// particles;
+/// @throws ConfigError for combinations that METHOD.md section 4 does not allow (checkLayout) or
+/// without particles;
 ///         MemoryError
 LightField traceLightField(const transport::Medium& medium, const transport::LightList& lights,
                            const LightFieldLayout& layout, const View& view,
@@ -85,7 +132,11 @@ double automaticRadius(const transport::Medium& medium, const LightFieldLayout& 
 /// function, which is then smoothed and laid out for lookups (METHOD.md sections 5.1 to 5.3).
 /// Fluence on voxels is smoothed plainly and sharpened by twicing, which was nearer to path tracing
 /// in every case tried than METHOD's mean of plain and density-weighted smoothing.
-std::unique_ptr<InscatterSource> resolve(const transport::Medium& medium, const LightField& field,
-                                         const View& view);
+/// Evaluate::perStep keeps the field instead and asks it at every march step.
+/// @param medium  must outlive the source
+/// @param field   std::move it where it is not needed again
+/// @param key     of the random numbers that Merge::sampled draws
+std::unique_ptr<InscatterSource> resolve(const transport::Medium& medium, LightField field,
+                                         const View& view, RandomKey key = {});
 
 }  // namespace photosphere::estimators

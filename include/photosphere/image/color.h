@@ -64,6 +64,10 @@ class ColorConfig {
   std::shared_ptr<const Impl> m_impl;
 };
 
+/// Primaries and white of a linear space by the name or alias it has in ACES configs, whatever the
+/// config; nothing for others.
+std::optional<Chromaticities> knownChromaticities(std::string space);
+
 /// The config shipped with this tool: `$PHOTOSPHERE_DATA/color/config.ocio`, else in the source
 /// tree, else in `share/photosphere` of the installation. @throws InputMissingError naming every
 /// place

@@ -52,6 +52,15 @@ ErrorMetrics measure(const std::vector<std::span<const float>>& image,
                      const std::vector<std::span<const float>>& reference, int width,
                      Vec2i origin = Vec2i(0), const MeasureOptions& options = {});
 
+/// Mean over pixels and channels of (a - ref)(b - ref) / (ref^2 + (0.1 mean ref)^2): relMse for
+/// a = b. For two independent frames of one estimator its expectation is the squared bias, without
+/// their noise. Pixels with a value that is not finite in any of the three are left out.
+/// @throws ConfigError when the planes differ in number or size
+double relativeProduct(const std::vector<std::span<const float>>& a,
+                       const std::vector<std::span<const float>>& b,
+                       const std::vector<std::span<const float>>& reference,
+                       std::span<const unsigned char> mask = {});
+
 /// Variance of the mean of two independent, equally noisy estimates, per pixel: (a - b)^2 / 4. With
 /// reference (a + b) / 2, d^2 minus it is (x - a)(x - b), whose mean has no noise of the reference.
 std::vector<float> varianceOfMean(std::span<const float> a, std::span<const float> b);
@@ -84,7 +93,8 @@ struct CompareOptions {
   const Image* secondReference = nullptr;
 };
 
-/// Compares every layer that both images have.
+/// Compares every layer that both images have. Of a depth (`Z`), pixels that are at 1e10 or beyond
+/// in both, where neither met anything, are left out.
 /// @throws ConfigError when windows do not match, or the images share no layer
 ImageComparison compareImages(const Image& image, const Image& reference,
                               const CompareOptions& options = {});

@@ -2,6 +2,7 @@
 // 8-bit pictures for people.
 
 #include <filesystem>
+#include <span>
 #include <string>
 
 #include "photosphere/image/color.h"
@@ -18,6 +19,15 @@ struct DisplayOptions {
   bool dither = false;       ///< else rounded to the nearest of 256 levels
   int jpegQuality = 92;
 };
+
+/// The bytes of a PNG of the display window, as writePreview makes it.
+/// @throws ConfigError as writePreview; OutputError when it cannot be encoded
+std::string encodePreview(const Image& image, const ColorConfig& config,
+                          const DisplayOptions& options = {});
+
+/// The bytes of a PNG of display values in [0, 1] as they are: r, g, b, row by row from the top.
+/// @throws ConfigError when `rgb` is not 3 * width * height values; OutputError
+std::string encodePng(int width, int height, std::span<const float> rgb);
 
 /// Writes a PNG or JPEG, by the path's extension, of the display window: black outside the data
 /// window, premultiplied colour over black. Whole or not at all.

@@ -72,7 +72,9 @@ std::unique_ptr<Integrator> makePathIntegrator(const transport::Medium& medium,
                                                const PathOptions& options);
 
 struct MarchOptions {
-  float step = 1.0f;  ///< march step over voxel edge
+  float step = 1.0f;   ///< march step over voxel edge
+  int gatherRays = 0;  ///< of each camera ray; > 0 = final gathering: `multiple` is looked up after
+                       ///< the first bounce, from a source that answers toward any direction
   Effects effects;
 };
 

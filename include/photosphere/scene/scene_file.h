@@ -18,6 +18,8 @@ struct VolumeEntry {
       albedoGrid;  ///< where `albedo` names a grid; else empty and `values` holds the number
   std::string phase = "henyey_greenstein";  ///< phase plug-in
   ParamValues phaseValues;                  ///< that plug-in's rows
+  bool emits = false;                       ///< `emission` was given
+  ParamValues emission;                     ///< emissionParams()
   std::string where;  ///< "scene.toml:12: [[volume]] 0", begins messages about it
 };
 
@@ -53,10 +55,22 @@ struct SceneFile {
 /// Rows of the tables that belong to no plug-in: for --help and `photosphere list`.
 std::span<const Param> sceneParams();
 std::span<const Param> volumeParams();
+/// Keys of `emission`, an inline table of a volume.
+std::span<const Param> emissionParams();
 std::span<const Param> estimatorParams();
 std::span<const Param> effectsParams();
 std::span<const Param> renderParams();
 std::span<const Param> outputParams();
+
+/// A named set of values of [estimator], for `preset`. Keys given beside it win.
+struct PresetValue {
+  std::string_view key, value;
+};
+struct Preset {
+  std::string_view name, help;
+  std::span<const PresetValue> values;
+};
+std::span<const Preset> estimatorPresets();
 
 /// Reads and checks a scene file.
 /// @param sets  `dotted.path=value` with the value as TOML, else as a string:

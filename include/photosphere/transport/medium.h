@@ -3,11 +3,13 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "photosphere/core/types.h"
 #include "photosphere/phase/phase.h"
+#include "photosphere/transport/emission.h"
 #include "photosphere/volume/bricks.h"
 #include "photosphere/volume/majorant_grid.h"
 
@@ -26,6 +28,7 @@ struct MediumVolume {
   std::vector<volume::BrickField<float>> albedoFields;  ///< none, one (grey) or three
   Mat4d localFromAlbedoNode{1.0};
   phase::HenyeyGreenstein phase{0.0};
+  VolumeEmission emission;  ///< its field is empty where the volume does not emit
 };
 
 /// Coefficients at a point.
@@ -49,11 +52,29 @@ class Medium {
   /// sigma_t [1/m]. Only for a medium with bounds: an empty one has no place to ask about.
   float extinction(const Vec3f& p) const {
     const Placed& first = m_placed.front();
-    float sum = first.scale * first.field->sample(first.nodeFromLocal(p));
-    for (std::size_t i = 1; i < m_placed.size(); ++i)
-      sum += m_placed[i].scale * m_placed[i].field->sample(m_placed[i].nodeFromLocal(p));
-    return sum;
+    return first.scale * first.field->sample(first.nodeFromLocal(p)) + others(p);
   }
+  /// The same along a ray, whose way through the first volume's nodes is worked out once.
+  class AlongRay {
+   public:
+    AlongRay(const Medium& medium, const Vec3f& o, const Vec3f& d)
+        : m_medium(&medium), m_origin(o), m_direction(d) {
+      const Placed& first = medium.m_placed.front();
+      m_nodeOrigin = first.nodeFromLocal(o);
+      m_nodeDirection = first.nodeFromLocalDirection(d);
+    }
+    /// sigma_t [1/m] at a distance [m].
+    float operator()(float t) const {
+      const Placed& first = m_medium->m_placed.front();
+      const float sum = first.scale * first.field->sample(m_nodeOrigin + m_nodeDirection * t);
+      return m_medium->m_placed.size() == 1 ? sum
+                                            : sum + m_medium->others(m_origin + m_direction * t);
+    }
+
+   private:
+    const Medium* m_medium;
+    Vec3f m_origin, m_direction, m_nodeOrigin, m_nodeDirection;
+  };
   /// All coefficients at a point.
   void coefficients(const Vec3f& p, Coefficients& out) const;
 
@@ -64,9 +85,11 @@ class Medium {
   /// Distinct phase functions, in order of first use.
   const std::vector<phase::HenyeyGreenstein>& phases() const { return m_phases; }
   const volume::MajorantGrid& majorants() const { return m_majorants; }
-  /// Tight box around all extinction; empty when there is none.
+  /// Light that the medium gives off; nullptr when it gives off none.
+  const Emission* emission() const { return m_emission.get(); }
+  /// Tight box around all extinction and emission; empty when there is neither.
   const Box3d& bounds() const { return m_majorants.bounds(); }
-  /// Smallest voxel edge of all volumes [m].
+  /// Smallest voxel edge of all densities [m]; of all emission where there is no density.
   double voxelEdge() const { return m_voxelEdge; }
   /// True when every albedo has equal channels.
   bool isGrey() const { return m_grey; }
@@ -84,8 +107,9 @@ class Medium {
     Vec3f column0, column1, column2, offset;  // node = column * local + offset
     float scale;
     int phaseIndex;
-    Vec3f nodeFromLocal(const Vec3f& p) const {
-      return column0 * p.x + column1 * p.y + column2 * p.z + offset;
+    Vec3f nodeFromLocal(const Vec3f& p) const { return nodeFromLocalDirection(p) + offset; }
+    Vec3f nodeFromLocalDirection(const Vec3f& d) const {
+      return column0 * d.x + column1 * d.y + column2 * d.z;
     }
   };
   struct Albedo {
@@ -94,6 +118,13 @@ class Medium {
     Rgb at(const Vec3f& p) const;
   };
 
+  // sigma_t of every volume but the first.
+  float others(const Vec3f& p) const {
+    float sum = 0.0f;
+    for (std::size_t i = 1; i < m_placed.size(); ++i)
+      sum += m_placed[i].scale * m_placed[i].field->sample(m_placed[i].nodeFromLocal(p));
+    return sum;
+  }
   static Placed place(const volume::BrickField<float>& field, const Mat4d& localFromNode,
                       double scale, int phaseIndex);
 
@@ -101,6 +132,7 @@ class Medium {
   std::vector<Placed> m_placed;
   std::vector<Albedo> m_albedo;
   std::vector<phase::HenyeyGreenstein> m_phases;
+  std::unique_ptr<Emission> m_emission;
   volume::MajorantGrid m_majorants;
   double m_voxelEdge = 1.0;
   bool m_grey = true;

@@ -1,7 +1,7 @@
 #pragma once
-// Photon tracing into a sink (Min & Ihm 2010, section 4.1, figure 3): lamps emit photons of equal
-// power, each flies, collides, is absorbed or scattered by Russian roulette, one direction per
-// event.
+// Photon tracing into a sink (Min & Ihm 2010, section 4.1, figure 3): lamps and glowing smoke emit
+// photons of equal power, each flies, collides, is absorbed or scattered by Russian roulette, one
+// direction per event.
 
 #include <cstdint>
 #include <memory>
@@ -16,6 +16,9 @@ namespace photosphere::transport {
 
 using LightList = std::vector<std::unique_ptr<lights::Light>>;
 
+/// Stands for a lamp's index where the smoke's own emission is the source.
+inline constexpr std::uint32_t kEmittedBySmoke = ~0u;
+
 /// One straight flight of a photon, from real collision (or entry) to real collision (or exit).
 /// Local space.
 struct Flight {
@@ -24,8 +27,8 @@ struct Flight {
   Vec3f direction{0.0f};          ///< unit
   float extinctionAtEnd = 0.0f;   ///< sigma_t at the collision [1/m]; 0 = the photon left
   Rgb power{0.0f};                ///< whole power P per photon [W]: divide by the photon count
-  std::uint32_t scatterings = 0;  ///< events before this flight; 0 = as the lamp sent it
-  std::uint32_t light = 0;        ///< index of the lamp
+  std::uint32_t scatterings = 0;  ///< events before this flight; 0 = as its source sent it
+  std::uint32_t light = 0;        ///< index of the lamp, or kEmittedBySmoke
   std::uint64_t photon = 0;       ///< index over all photons of the frame
   std::uint32_t ordinal = 0;      ///< number of this flight among the photon's
   bool collided() const { return extinctionAtEnd > 0.0f; }
@@ -45,9 +48,10 @@ struct TraceOptions {
   RandomKey key;
 };
 
-/// What became of the photons. Powers are per channel [W] of the whole frame's lamps.
+/// What became of the photons. Powers are per channel [W] of all the frame's light.
 struct TraceStatistics {
   std::uint64_t photons = 0;  ///< emitted in this run
+  std::uint64_t born = 0;     ///< of these, by the smoke itself
   std::uint64_t scatterings = 0;
   std::uint64_t flights = 0;
   std::uint64_t capped = 0;  ///< photons ended by the roulette after kLongPath events
@@ -61,11 +65,15 @@ struct TraceStatistics {
 /// section 6): unbiased, and ends paths that albedo 1 would never end.
 inline constexpr std::uint32_t kLongPath = 10'000;
 
-/// Traces photons of all lights, chosen in proportion to their power, and hands every flight to the
-/// sink. Deterministic in everything but the order in which batches reach the sink.
+/// Traces photons of all lights and of the medium's emission, chosen in proportion to their power,
+/// and hands every flight to the sink. Deterministic in everything but the order in which batches
+/// reach the sink.
 /// @throws InterruptedError
 TraceStatistics tracePhotons(const Medium& medium, const LightList& lights,
                              const TraceOptions& options, FlightSink& sink);
+
+/// Power that photons of a frame share [W]: of each lamp and of the emission, the largest channel.
+double sharedPower(const Medium& medium, const LightList& lights);
 
 /// Sphere around the medium's bounds: what photons are aimed at.
 lights::BoundingSphere boundingSphere(const Medium& medium);

@@ -51,6 +51,7 @@ struct Collision {
 template <class Visit>
 inline void forEachTentative(const Medium& medium, const Vec3f& o, const Vec3f& d, float length,
                              Rng& rng, TrackingCounters& counters, const Visit& visit) {
+  const Medium::AlongRay extinction(medium, o, d);
   float tau = -fastLog(rng.uniformPositive());
   for (volume::MajorantGrid::Walk walk(medium.majorants(), o, d, 0.0f, length); !walk.done();
        walk.advance()) {
@@ -64,7 +65,7 @@ inline void forEachTentative(const Medium& medium, const Vec3f& o, const Vec3f& 
         break;
       }
       t += tau / majorant;
-      const float sigma = medium.extinction(o + d * t);
+      const float sigma = extinction(t);
       ++counters.lookups;
       if (sigma > majorant * 1.001f) ++counters.majorantViolations;
       if (!visit(t, sigma, majorant)) return;
@@ -123,6 +124,21 @@ inline Collision sampleCollisionAndTransmittance(const Medium& medium, const Vec
     return attenuate(transmittance, sigma, majorant, rng) || !first.happened();
   });
   return first;
+}
+
+/// Unbiased integral of the medium's emission along a ray [W m^-2 sr^-1], not attenuated: up to a
+/// real collision its mean is what arrives attenuated. One random point in every stretch of the
+/// lattice that can emit.
+inline Rgb sampleEmission(const Medium& medium, const Emission& emission, const Vec3f& o,
+                          const Vec3f& d, float length, Rng& rng) {
+  Rgb sum(0.0f);
+  for (volume::MajorantGrid::Walk walk(medium.majorants(), o, d, 0.0f, length); !walk.done();
+       walk.advance()) {
+    if (!emission.inCell(walk.cell())) continue;
+    const float span = walk.end() - walk.begin();
+    if (span > 0.0f) sum += span * emission.at(o + d * (walk.begin() + rng.uniform() * span));
+  }
+  return sum;
 }
 
 /// Optical depth along a ray by the midpoint rule.

@@ -8,8 +8,10 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <type_traits>
 #include <vector>
 
+#include "photosphere/core/simd.h"
 #include "photosphere/core/types.h"
 #include "photosphere/volume/grid.h"
 
@@ -50,14 +52,7 @@ class BrickField {
     const float fx = p.x - static_cast<float>(x);
     const float fy = p.y - static_cast<float>(y);
     const float fz = p.z - static_cast<float>(z);
-    constexpr int dy = kNodes, dz = kNodes * kNodes;
-    const T c00 = n[0] + (n[1] - n[0]) * fx;
-    const T c10 = n[dy] + (n[dy + 1] - n[dy]) * fx;
-    const T c01 = n[dz] + (n[dz + 1] - n[dz]) * fx;
-    const T c11 = n[dz + dy] + (n[dz + dy + 1] - n[dz + dy]) * fx;
-    const T c0 = c00 + (c10 - c00) * fy;
-    const T c1 = c01 + (c11 - c01) * fy;
-    return c0 + (c1 - c0) * fz;
+    return interpolate(n, fx, fy, fz);
   }
 
   const Vec3i& origin() const { return m_origin; }
@@ -76,6 +71,28 @@ class BrickField {
   }
 
  private:
+  // Trilinear value in the cell whose lowest node is n[0].
+  static T interpolate(const T* n, float fx, float fy, float fz) {
+    constexpr int dy = kNodes, dz = kNodes * kNodes;
+    if constexpr (std::is_same_v<T, float>) {
+      // Two rows of two nodes a register, below and above.
+      const Float4 low = loadPairs(n, n + dy);
+      const Float4 face = low + (loadPairs(n + dz, n + dz + dy) - low) * fz;
+      const Float4 edge = face + (__builtin_shufflevector(face, face, 2, 3, 2, 3) - face) * fy;
+      return edge[0] + (edge[1] - edge[0]) * fx;
+    } else {
+      const auto at = [n](int i) { return load(&n[i].x); };
+      const Float4 c00 = at(0) + (at(1) - at(0)) * fx;
+      const Float4 c10 = at(dy) + (at(dy + 1) - at(dy)) * fx;
+      const Float4 c01 = at(dz) + (at(dz + 1) - at(dz)) * fx;
+      const Float4 c11 = at(dz + dy) + (at(dz + dy + 1) - at(dz + dy)) * fx;
+      const Float4 c0 = c00 + (c10 - c00) * fy;
+      const Float4 c1 = c01 + (c11 - c01) * fy;
+      const Float4 v = c0 + (c1 - c0) * fz;
+      return {v[0], v[1], v[2], v[3]};
+    }
+  }
+
   std::size_t tableIndex(int bx, int by, int bz) const {
     return (static_cast<std::size_t>(bz) * static_cast<std::size_t>(m_bricks.y) +
             static_cast<std::size_t>(by)) *
@@ -94,10 +111,30 @@ class BrickField {
 extern template class BrickField<float>;
 extern template class BrickField<Vec4f>;
 
+/// Calls visit(value) for every stored node; those that bricks share, more than once.
+template <class T, class Visit>
+void forEachNode(const BrickField<T>& field, const Visit& visit) {
+  const Vec3i& bricks = field.bricks();
+  for (int z = 0; z < bricks.z && !field.empty(); ++z)
+    for (int y = 0; y < bricks.y; ++y)
+      for (int x = 0; x < bricks.x; ++x) {
+        const std::int32_t brick = field.brickAt({x, y, z});
+        for (int i = 0; brick >= 0 && i < BrickField<T>::kBrickSize; ++i)
+          visit(field.nodes(brick)[i]);
+      }
+}
+
+inline float largest(float value) {
+  return value;
+}
+inline float largest(const Vec4f& value) {
+  return std::max(std::max(value.x, value.y), std::max(value.z, value.w));
+}
+
 /// Calls visit(lowest node, cells along an edge, largest value) for every voxel cell whose
 /// interpolant can be positive; a brick of one constant value is visited whole.
-template <class Visit>
-void forEachCell(const BrickField<float>& field, const Visit& visit) {
+template <class T, class Visit>
+void forEachCell(const BrickField<T>& field, const Visit& visit) {
   if (field.empty()) return;
   const Vec3i& bricks = field.bricks();
   for (int bz = 0; bz < bricks.z; ++bz)
@@ -105,23 +142,22 @@ void forEachCell(const BrickField<float>& field, const Visit& visit) {
       for (int bx = 0; bx < bricks.x; ++bx) {
         const std::int32_t brick = field.brickAt({bx, by, bz});
         if (brick < 0) continue;
-        const float* n = field.nodes(brick);
+        const T* n = field.nodes(brick);
         const Vec3i first(bx * 8, by * 8, bz * 8);
         if (field.isConstant(brick)) {
-          visit(first, 8, n[0]);
+          visit(first, 8, largest(n[0]));
           continue;
         }
-        constexpr int dy = BrickField<float>::kNodes,
-                      dz = BrickField<float>::kNodes * BrickField<float>::kNodes;
+        constexpr int dy = BrickField<T>::kNodes,
+                      dz = BrickField<T>::kNodes * BrickField<T>::kNodes;
         for (int z = 0; z < 8; ++z)
           for (int y = 0; y < 8; ++y)
             for (int x = 0; x < 8; ++x) {
-              const float* c = n + z * dz + y * dy + x;
-              const float low = std::max(std::max(c[0], c[1]), std::max(c[dy], c[dy + 1]));
-              const float high =
-                  std::max(std::max(c[dz], c[dz + 1]), std::max(c[dz + dy], c[dz + dy + 1]));
-              const float largest = std::max(low, high);
-              if (largest > 0) visit(first + Vec3i(x, y, z), 1, largest);
+              const T* c = n + z * dz + y * dy + x;
+              float most = largest(c[0]);
+              for (const int corner : {1, dy, dy + 1, dz, dz + 1, dz + dy, dz + dy + 1})
+                most = std::max(most, largest(c[corner]));
+              if (most > 0) visit(first + Vec3i(x, y, z), 1, most);
             }
       }
 }

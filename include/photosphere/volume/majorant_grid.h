@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -19,18 +20,28 @@ struct MajorantSource {
   double scale = 1.0;        ///< extinction per unit of value [1/m]
 };
 
+/// A region that rays must walk through although nothing in it absorbs or scatters: a flame.
+struct WalkedRegion {
+  Box3d box;                                                 ///< local space [m]; empty = none
+  double spacing = std::numeric_limits<double>::infinity();  ///< of its voxels [m]
+};
+
 /// Axis-aligned lattice of majorants of the summed trilinear extinction, local space [m].
 class MajorantGrid {
  public:
   MajorantGrid() = default;
   /// Cells are four voxels of the finest source wide, coarsened until at most `maxCells` remain.
-  explicit MajorantGrid(std::span<const MajorantSource> sources, std::size_t maxCells = 1u << 23);
+  explicit MajorantGrid(std::span<const MajorantSource> sources, const WalkedRegion& also = {},
+                        std::size_t maxCells = 1u << 23);
 
-  /// Tight box around all extinction, local space [m]; empty when there is none.
+  /// Tight box around all extinction and what is walked beside it, local space [m]; empty when
+  /// there is neither.
   const Box3d& bounds() const { return m_bounds; }
   const Vec3i& dims() const { return m_dims; }
   Vec3f cellSize() const { return m_cellSize; }
   float majorant(const Vec3i& cell) const { return m_values[cellIndex(cell)]; }
+  /// Number of cells; `Walk::cell` and `forEachOverlapped` count them from 0.
+  std::size_t size() const { return m_values.size(); }
   /// Largest majorant [1/m].
   float maximum() const { return m_maximum; }
   std::uint64_t memoryBytes() const { return m_values.size() * sizeof(float); }
@@ -52,6 +63,7 @@ class MajorantGrid {
     }
     bool done() const { return !(m_t < m_end); }
     float majorant() const { return m_values[m_index]; }
+    std::size_t cell() const { return static_cast<std::size_t>(m_index); }
     float begin() const { return m_t; }
     /// End of the current cell along the ray.
     float end() const { return std::min(m_end, std::min(m_x.next, std::min(m_y.next, m_z.next))); }
@@ -97,6 +109,26 @@ class MajorantGrid {
     Axis m_x, m_y, m_z;
   };
 
+  /// Calls visit(cell) for every cell that a cube of node spacings overlaps.
+  /// @param lowest, edge  the cube's lowest node and its edge in nodes
+  template <class Visit>
+  void forEachOverlapped(const Mat4d& localFromNode, const Vec3i& lowest, int edge,
+                         const Visit& visit) const {
+    const Vec3d x(localFromNode[0]), y(localFromNode[1]), z(localFromNode[2]);
+    // Cells that only touch a coarse boundary must not raise the neighbour: the interpolant is
+    // continuous, so the shared face is bounded from the inner side up to rounding.
+    const double shrink = 1e-4 * std::min({glm::length(x), glm::length(y), glm::length(z)});
+    const Vec3d half = 0.5 * edge * (glm::abs(x) + glm::abs(y) + glm::abs(z)) - shrink;
+    const Vec3d center = transformPoint(localFromNode, Vec3d(lowest) + 0.5 * edge) - m_bounds.min;
+    const Vec3d inverse = 1.0 / Vec3d(m_cellSize);
+    const Vec3i lo = glm::max(Vec3i((center - half) * inverse), Vec3i(0));
+    const Vec3i hi = glm::min(Vec3i((center + half) * inverse), m_dims - 1);
+    for (int k = lo.z; k <= hi.z; ++k)
+      for (int j = lo.y; j <= hi.y; ++j)
+        for (int i = lo.x; i <= hi.x; ++i)
+          visit(cellIndex({i, j, k}));
+  }
+
  private:
   std::size_t cellIndex(const Vec3i& c) const {
     return (static_cast<std::size_t>(c.z) * static_cast<std::size_t>(m_dims.y) +
@@ -114,6 +146,26 @@ class MajorantGrid {
 };
 
 /// Local-space box of the cells of a field where interpolation can give anything but zero [m].
-Box3d supportBounds(const MajorantSource& source);
+template <class T>
+Box3d supportBounds(const BrickField<T>& field, const Mat4d& localFromNode) {
+  Box3i nodes;
+  forEachCell(field, [&](const Vec3i& cell, int edge, float) {
+    nodes.grow(cell);
+    nodes.grow(cell + edge);
+  });
+  Box3d box;
+  if (nodes.empty()) return box;
+  for (int corner = 0; corner < 8; ++corner)
+    box.grow(transformPoint(localFromNode, Vec3d(corner & 1 ? nodes.max.x : nodes.min.x,
+                                                 corner & 2 ? nodes.max.y : nodes.min.y,
+                                                 corner & 4 ? nodes.max.z : nodes.min.z)));
+  return box;
+}
+
+/// Shortest spacing of nodes along the three axes [m].
+inline double finestSpacing(const Mat4d& localFromNode) {
+  return std::min({glm::length(Vec3d(localFromNode[0])), glm::length(Vec3d(localFromNode[1])),
+                   glm::length(Vec3d(localFromNode[2]))});
+}
 
 }  // namespace photosphere::volume

@@ -141,7 +141,7 @@ void addAttribute(const UniFile& data, const std::string& name,
 std::string attributeOf(const std::string& field, const std::string& particles) {
   const std::string group = particles.substr(2);
   if (field.size() <= group.size() + 1 || field[0] != 'p' || !field.ends_with(group)) return {};
-  const std::string name = field.substr(1, field.size() - group.size() - 1);
+  std::string name = field.substr(1, field.size() - group.size() - 1);
   // In the group without a suffix, `pVelSnd` is of another group.
   if (name[0] < 'A' || name[0] > 'Z' || (group.empty() && name.ends_with("Snd"))) return {};
   return name;

@@ -32,7 +32,7 @@ struct Options {
 
 /// -o, else output.file. @throws ConfigError
 std::string chooseOutput(const scene::SceneFile& scene, const std::string& option) {
-  const std::string path = option.empty() ? scene.resolvePath(scene.output.text("file")) : option;
+  std::string path = option.empty() ? scene.resolvePath(scene.output.text("file")) : option;
   if (path.empty())
     throw ConfigError("no output; give -o beauty.####.exr, or output.file in the scene");
   if (std::filesystem::path(path).extension() != ".exr")

@@ -1,0 +1,126 @@
+#include "phase_reader.h"
+
+#include <cmath>
+
+namespace photosphere::estimators {
+
+PhaseReader::PhaseReader(const LightFieldLayout& layout, const transport::Medium& medium, int phase)
+    : m_layout(layout), m_medium(medium), m_phase(phase) {
+  if (layout.basis == Basis::view) return;
+  const auto& function = medium.phases()[static_cast<std::size_t>(phase)];
+  const sphere::BinWeights::Phase plain = [&function](const Vec3f& w, const Vec3f& wo) {
+    return static_cast<double>(function.evaluate(w, wo));
+  };
+  const bool smooths = layout.angularKernel != sphere::AngularKernel::none &&
+                       layout.direction != sphere::DirectionDeposit::kernel;
+  const bool restores = layout.evaluate == Evaluate::perStep && layout.merge == Merge::sampled;
+  if (restores && !layout.keepsMeans()) {
+    restore(plain);
+    return;
+  }
+  if (layout.basis == Basis::histogram && !smooths && !layout.keepsMeans()) {
+    m_bins.emplace(layout.binShares(), plain, function.g(), sphere::Reconstruction::smooth);
+    return;
+  }
+  // Smoothing the light is smoothing the phase function: both convolve with the kernel.
+  sphere::LegendreMoments moments = sphere::phaseMoments(plain);
+  if (smooths)
+    moments = sphere::convolved(moments, sphere::kernelMoments(layout.smoothing(), moments.size()));
+  if (layout.basis == Basis::sphericalHarmonics) {
+    // Convolving with a function of the angle scales degree l by its moment (Funk & Hecke): exact
+    // up to the order, at the moments' own length zero.
+    m_harmonics.emplace(layout.order);
+    for (int i = 0; i < m_harmonics->count(); ++i) {
+      const auto l = static_cast<std::size_t>(sphere::SphericalHarmonics::degree(i));
+      m_moments.push_back(l < moments.size() ? static_cast<float>(moments[l]) : 0.0f);
+    }
+    return;
+  }
+  if (layout.keepsMeans()) {
+    m_lobes.emplace(moments);
+    return;
+  }
+  const sphere::ZonalTable smooth(moments);
+  m_bins.emplace(
+      layout.binShares(),
+      [&smooth](const Vec3f& w, const Vec3f& wo) { return static_cast<double>(smooth(w, wo)); },
+      smooth.meanCosine(), sphere::Reconstruction::smooth);
+}
+
+// The paper's way: bins are restored to K directions (eq. 8), and the phase function is taken at
+// those (eq. 9).
+void PhaseReader::restore(const sphere::BinWeights::Phase&) {
+  const int rows = static_cast<int>(std::lround(std::sqrt(m_layout.directions / 8.0)));
+  const sphere::Partition bins(m_layout.rows), cells(rows);
+  const bool smooths = m_layout.direction != sphere::DirectionDeposit::kernel;
+  for (const double share : sphere::smoothingMatrix(
+           bins, cells, smooths ? m_layout.smoothing() : sphere::SmoothingKernel()))
+    m_restored.push_back(static_cast<float>(share));
+  for (int k = 0; k < cells.size(); ++k)
+    m_directions.push_back(cells.center(k));
+}
+
+void PhaseReader::turn(const Vec3f& wo, Toward& toward) const {
+  toward.wo = wo;
+  const auto bins = static_cast<std::size_t>(m_layout.bins());
+  if (m_bins) {
+    toward.weights.resize(bins);
+    m_bins->weights(wo, toward.weights.data());
+  } else if (m_harmonics) {
+    toward.weights.resize(bins);
+    m_harmonics->evaluate(wo, toward.weights.data());
+    for (std::size_t i = 0; i < bins; ++i)
+      toward.weights[i] *= m_moments[i];
+  } else if (!m_directions.empty()) {
+    const auto& function = m_medium.phases()[static_cast<std::size_t>(m_phase)];
+    toward.weights.assign(bins, 0.0f);
+    for (std::size_t k = 0; k < m_directions.size(); ++k) {
+      const float f = function.evaluate(m_directions[k], wo);
+      const float* shares = m_restored.data() + k * bins;
+      for (std::size_t j = 0; j < bins; ++j)
+        toward.weights[j] += f * shares[j];
+    }
+  }
+}
+
+Rgb PhaseReader::read(const float* set, const Toward& toward) const {
+  const int channelCount = m_layout.channels;
+  if (m_layout.basis == Basis::view) return channels(set + m_phase * channelCount);
+  Rgb sum(0.0f);
+  const int bins = m_layout.bins();
+  if (m_lobes) {
+    for (int j = 0; j < bins; ++j) {
+      const float f = lobe(set, j, toward.wo);
+      for (int c = 0; c < channelCount; ++c)
+        sum[c] += f * set[j * channelCount + c];
+    }
+  } else {
+    for (int j = 0; j < bins; ++j)
+      for (int c = 0; c < channelCount; ++c)
+        sum[c] += toward.weights[static_cast<std::size_t>(j)] * set[j * channelCount + c];
+  }
+  return channels(&sum.x);
+}
+
+Rgb PhaseReader::readBin(const float* set, int bin, const Toward& toward) const {
+  const float f =
+      m_lobes ? lobe(set, bin, toward.wo) : toward.weights[static_cast<std::size_t>(bin)];
+  return f * channels(set + bin * m_layout.channels);
+}
+
+// The bin's light as a lobe about its mean direction, as wide as that mean is short. The phase
+// function at the mean direction itself, which is what the paper takes, forgets the spread within
+// the bin (METHOD.md section 5.5: 7 to 10 % dark at g = 0.7); it is the limit of no spread.
+float PhaseReader::lobe(const float* set, int bin, const Vec3f& wo) const {
+  const float* sum = set + m_layout.bins() * m_layout.channels + 3 * bin;
+  const float power = binPower(m_layout, set, bin);
+  const Vec3f direction(sum[0], sum[1], sum[2]);
+  const float length = std::sqrt(glm::dot(direction, direction));
+  // No light, or light from all sides: no direction, and a lobe without one is even.
+  if (!(std::abs(power) > 0.0f) || !(length > 1e-30f)) return (*m_lobes)(0.0f, wo, wo);
+  // Both are negative where sharpening took away more than there was.
+  return (*m_lobes)(length / std::abs(power), direction * ((power < 0 ? -1.0f : 1.0f) / length),
+                    wo);
+}
+
+}  // namespace photosphere::estimators

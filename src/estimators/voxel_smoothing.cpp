@@ -1,0 +1,126 @@
+#include "voxel_smoothing.h"
+
+#include <cmath>
+
+#include "particle_index.h"
+#include "photosphere/core/parallel.h"
+
+namespace photosphere::estimators {
+
+using transport::SupportLattice;
+
+namespace {
+
+using Field = volume::BrickField<Vec4f>;
+
+struct Tap {
+  Vec3i offset;
+  float weight;
+};
+
+std::vector<Tap> kernelTaps(SpatialKernel kernel, double radiusInVoxels) {
+  std::vector<Tap> taps;
+  const int reach = static_cast<int>(std::floor(radiusInVoxels));
+  const double r2 = std::max(radiusInVoxels * radiusInVoxels, 1e-12);
+  for (int z = -reach; z <= reach; ++z)
+    for (int y = -reach; y <= reach; ++y)
+      for (int x = -reach; x <= reach; ++x) {
+        const double d2 = static_cast<double>(x * x + y * y + z * z);
+        const float w = kernelWeight(kernel, static_cast<float>(d2 / r2));
+        if (w > 0.0f) taps.push_back({{x, y, z}, w});
+      }
+  if (taps.empty()) taps.push_back({{0, 0, 0}, 1.0f});
+  return taps;
+}
+
+// Weighted mean over the active neighbours; inactive ones leave both sum and weight.
+Colours convolve(const SupportLattice& lattice, const Colours& colours,
+                 const std::vector<Tap>& taps) {
+  Colours out(colours.size());
+  parallelFor(out.size(), 512, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      Vec4f sum(0.0f);
+      float weight = 0.0f;
+      for (const Tap& tap : taps) {
+        const std::int32_t n = lattice.number(lattice.voxel(i) + tap.offset);
+        if (n < 0) continue;
+        sum += tap.weight * colours[static_cast<std::size_t>(n)];
+        weight += tap.weight;
+      }
+      out[i] = sum / weight;  // at least this voxel itself
+    }
+  });
+  return out;
+}
+
+// What reading trilinearly between voxel means does to a smooth field: its mean over a voxel
+// becomes this mean of the neighbours' (along an axis 1/8, 3/4, 1/8).
+std::vector<Tap> readingTaps() {
+  std::vector<Tap> taps;
+  for (int z = -1; z <= 1; ++z)
+    for (int y = -1; y <= 1; ++y)
+      for (int x = -1; x <= 1; ++x)
+        taps.push_back(
+            {{x, y, z}, (x ? 0.125f : 0.75f) * (y ? 0.125f : 0.75f) * (z ? 0.125f : 0.75f)});
+  return taps;
+}
+
+}  // namespace
+
+Smoothed smoothVoxels(const SupportLattice& lattice, const Colours& colours, SpatialKernel kernel,
+                      double radius) {
+  const std::vector<Tap> taps = kernelTaps(kernel, radius / lattice.edge());
+  const bool widened = taps.size() > 1;
+  Smoothed smoothed;
+  smoothed.once = widened ? convolve(lattice, colours, taps) : colours;
+  smoothed.again = convolve(
+      lattice, widened ? convolve(lattice, smoothed.once, taps) : smoothed.once, readingTaps());
+  return smoothed;
+}
+
+Colours sharpened(const Smoothed& smoothed) {
+  Colours out(smoothed.once.size());
+  for (std::size_t i = 0; i < out.size(); ++i)
+    out[i] = glm::max(Vec4f(0.0f), 2.0f * smoothed.once[i] - smoothed.again[i]);
+  return out;
+}
+
+void fillUnreached(const transport::SupportLattice& lattice, Colours& colours,
+                   std::vector<std::uint8_t>& reached) {
+  while (true) {
+    std::vector<std::pair<std::size_t, Vec4f>> fresh;
+    for (std::size_t i = 0; i < colours.size(); ++i) {
+      if (reached[i]) continue;
+      Vec4f sum(0.0f);
+      float count = 0.0f;
+      for (int z = -1; z <= 1; ++z)
+        for (int y = -1; y <= 1; ++y)
+          for (int x = -1; x <= 1; ++x) {
+            const std::int32_t n = lattice.number(lattice.voxel(i) + Vec3i(x, y, z));
+            if (n < 0 || !reached[static_cast<std::size_t>(n)]) continue;
+            sum += colours[static_cast<std::size_t>(n)];
+            count += 1.0f;
+          }
+      if (count > 0.0f) fresh.emplace_back(i, sum / count);
+    }
+    if (fresh.empty()) return;
+    for (const auto& entry : fresh) {
+      colours[entry.first] = entry.second;
+      reached[entry.first] = 1;
+    }
+  }
+}
+
+volume::BrickField<Vec4f> layOut(const SupportLattice& lattice, const Colours& colours) {
+  return Field(Vec3i(0), lattice.bricks(), lattice.activeBricks(),
+               [&](const Vec3i& brick, Vec4f* nodes) {
+                 for (int z = 0; z < Field::kNodes; ++z)
+                   for (int y = 0; y < Field::kNodes; ++y)
+                     for (int x = 0; x < Field::kNodes; ++x) {
+                       const std::int32_t n = lattice.number(brick * 8 + Vec3i(x, y, z));
+                       *nodes++ = n >= 0 ? colours[static_cast<std::size_t>(n)] : Vec4f(0.0f);
+                     }
+               });
+}
+
+}  // namespace photosphere::estimators

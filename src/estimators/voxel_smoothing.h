@@ -1,0 +1,33 @@
+#pragma once
+// Smoothing of values on light voxels, and their layout for lookups.
+
+#include <vector>
+
+#include "photosphere/estimators/light_field.h"
+#include "photosphere/volume/bricks.h"
+
+namespace photosphere::estimators {
+
+/// Four values a voxel: a colour, or part of a histogram.
+using Colours = std::vector<Vec4f>;
+
+/// Colours of a lattice as bricks, nodes at voxel centres; zero where no voxel is active.
+volume::BrickField<Vec4f> layOut(const transport::SupportLattice& lattice, const Colours& colours);
+
+/// A field smoothed once, and what smoothing that again and reading it between voxels would leave.
+struct Smoothed {
+  Colours once, again;
+};
+/// Weighted means over the active neighbours; inactive ones leave both sum and weight.
+Smoothed smoothVoxels(const transport::SupportLattice& lattice, const Colours& colours,
+                      SpatialKernel kernel, double radius);
+
+/// Adds what a second blur takes away ("twicing", Stuetzle & Mittal 1979): the bias of voxel mean,
+/// kernel and interpolation falls from second to fourth order in their width. Light stays >= 0.
+Colours sharpened(const Smoothed& smoothed);
+
+/// Gives voxels that no particle reached the mean of their neighbours, ring by ring.
+void fillUnreached(const transport::SupportLattice& lattice, Colours& colours,
+                   std::vector<std::uint8_t>& reached);
+
+}  // namespace photosphere::estimators

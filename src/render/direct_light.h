@@ -1,0 +1,39 @@
+#pragma once
+// Light of lamps that scatters at a point for the first time: next-event estimation with the
+// frame's shadows.
+
+#include <vector>
+
+#include "photosphere/core/effects.h"
+#include "photosphere/render/integrator.h"
+#include "photosphere/render/shadows.h"
+
+namespace photosphere::render {
+
+/// A step of a march.
+struct MarchStep {
+  const transport::Segment& ray;
+  float t0, t1;  ///< along the ray [m]
+};
+
+/// Immutable; thread-safe. Holds references to what it is made of.
+class DirectLight {
+ public:
+  /// @param carried  lamps with extent are left to the estimator, which stores their light
+  DirectLight(const transport::Medium& medium, const transport::LightList& lights,
+              const Shadows& shadows, bool useShadows, bool carried);
+
+  /// Light scattered at `p` toward `wo` [W m^-3 sr^-1]. Where `p` is the middle of a march step, a
+  /// near lamp's 1/d^2 is averaged over the step.
+  Rgb at(const Vec3f& p, const Vec3f& wo, const transport::Coefficients& c, const MarchStep* step,
+         Rng& rng, IntegratorCounters& counters) const;
+
+ private:
+  const transport::Medium& m_medium;
+  const transport::LightList& m_lights;
+  const Shadows& m_shadows;
+  bool m_useShadows;
+  std::vector<std::size_t> m_lamps;
+};
+
+}  // namespace photosphere::render

@@ -1,0 +1,178 @@
+#include "estimator_options.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "photosphere/core/error.h"
+
+namespace photosphere::scene {
+
+using namespace estimators;
+
+namespace {
+
+// Min & Ihm 2010 as published; energy rule, kernel widths and radii are left open there, and have
+// the values of README.md.
+constexpr PresetValue kPaper[] = {
+    {"carrier", "particles"}, {"basis", "histogram"},
+    {"deposit", "collision"}, {"rows", "2"},
+    {"direction", "nearest"}, {"representative", "bin"},
+    {"energy", "scatter"},    {"merge", "sampled"},
+    {"evaluate", "per_step"}, {"kernel", "gaussian"},
+    {"bandwidth", "0.3"},     {"truncation", "3.0"},
+    {"directions", "128"},    {"spatial_kernel", "epanechnikov"},
+};
+constexpr Preset kPresets[] = {
+    {"paper", "the settings of Min & Ihm 2010, errata corrected", kPaper},
+};
+
+// An option and the key it is read from.
+template <class E>
+E choice(const ParamValues& values, std::string_view key,
+         std::initializer_list<std::pair<std::string_view, E>> names) {
+  const std::string& text = values.text(key);
+  for (const auto& [name, value] : names)
+    if (text == name) return value;
+  return names.begin()->second;
+}
+
+}  // namespace
+
+std::span<const Preset> estimatorPresets() {
+  return kPresets;
+}
+
+void applyPreset(ParamValues& estimator, const std::string& place) {
+  const std::string& wished = estimator.text("preset");
+  if (wished.empty()) return;
+  std::vector<std::string_view> known;
+  for (const Preset& preset : kPresets) {
+    known.push_back(preset.name);
+    if (wished != preset.name) continue;
+    for (const PresetValue& value : preset.values)
+      if (!estimator.given(value.key)) estimator.setText(value.key, value.value, place);
+    return;
+  }
+  throw ConfigError(fmt::format("{}: preset = '{}' is unknown{} (known: {})", place, wished,
+                                suggestion(wished, known), fmt::join(known, ", ")));
+}
+
+LightFieldLayout layoutOf(const ParamValues& e, bool lightCache) {
+  LightFieldLayout l;
+  l.carrier = choice<Carrier>(e, "carrier",
+                              {{"voxels", Carrier::voxels}, {"particles", Carrier::particles}});
+  l.deposit = choice<Deposit>(
+      e, "deposit", {{"track_length", Deposit::trackLength}, {"collision", Deposit::collision}});
+  l.energy = choice<EnergyRule>(e, "energy",
+                                {{"gather", EnergyRule::gather}, {"scatter", EnergyRule::scatter}});
+  l.kernel = choice<SpatialKernel>(e, "spatial_kernel",
+                                   {{"epanechnikov", SpatialKernel::epanechnikov},
+                                    {"box", SpatialKernel::box},
+                                    {"gaussian", SpatialKernel::gaussian}});
+  using sphere::DirectionDeposit;
+  l.direction = choice<DirectionDeposit>(e, "direction",
+                                         {{"nearest", DirectionDeposit::nearest},
+                                          {"barycentric", DirectionDeposit::barycentric},
+                                          {"kernel", DirectionDeposit::kernel}});
+  l.representative = choice<Representative>(
+      e, "representative", {{"bin", Representative::bin}, {"mean", Representative::mean}});
+  l.merge = choice<Merge>(e, "merge", {{"full", Merge::full}, {"sampled", Merge::sampled}});
+  l.evaluate = choice<Evaluate>(e, "evaluate",
+                                {{"per_view", Evaluate::perView}, {"per_step", Evaluate::perStep}});
+  using sphere::AngularKernel;
+  l.angularKernel = choice<AngularKernel>(e, "kernel",
+                                          {{"none", AngularKernel::none},
+                                           {"epanechnikov", AngularKernel::epanechnikov},
+                                           {"gaussian", AngularKernel::gaussian}});
+  l.bandwidth = e.real("bandwidth");
+  l.truncation = e.real("truncation");
+  l.directions = static_cast<int>(e.integer("directions"));
+  l.rows = static_cast<int>(e.integer("rows"));
+  l.order = static_cast<int>(e.integer("order"));
+  // Rays after the first bounce come from everywhere.
+  if (e.integer("final_gather") > 0) l.evaluate = Evaluate::perStep;
+  l.lightVoxel = e.real("light_voxel");
+  const bool ofBins = l.direction != DirectionDeposit::nearest ||
+                      l.representative != Representative::bin || l.merge != Merge::full ||
+                      l.evaluate != Evaluate::perView || l.angularKernel != AngularKernel::none;
+  const std::string& basis = e.text("basis");
+  l.basis = basis == "spherical_harmonics" ? Basis::sphericalHarmonics
+            : basis == "view" || (basis == "auto" && !lightCache && !ofBins) ? Basis::view
+                                                                             : Basis::histogram;
+  return l;
+}
+
+void checkEstimator(const ParamValues& e, const std::string& place) {
+  const auto refuse = [&](bool wrong, std::string_view message) {
+    if (wrong) throw ConfigError(fmt::format("{}: {}", place, message));
+  };
+  const bool cached = !e.text("cache").empty();
+  const bool gathers = e.integer("final_gather") > 0;
+  if (gathers && e.text("type") != "photosphere")
+    throw ConfigError(
+        fmt::format("{}: 'final_gather' looks the photosphere up; it needs type = "
+                    "\"photosphere\", not \"{}\"",
+                    place, e.text("type")));
+  refuse(gathers && e.text("basis") == "view",
+         "'final_gather' reads light toward every direction, and basis = \"view\" holds it toward "
+         "one camera; choose \"histogram\" or \"spherical_harmonics\"");
+  refuse(gathers && e.given("evaluate") && e.text("evaluate") == "per_view",
+         "'final_gather' reads light toward every direction: leave 'evaluate' out, or set it to "
+         "\"per_step\"");
+  const LightFieldLayout layout = layoutOf(e, cached);
+  refuse(e.real("deposit_radius") > 0 && !layout.holdsPower(),
+         "'deposit_radius' needs carrier = \"particles\" and deposit = \"collision\"; elsewhere "
+         "use 'radius'");
+  if (cached && e.text("type") != "photosphere")
+    throw ConfigError(
+        fmt::format("{}: 'cache' needs type = \"photosphere\", not \"{}\"", place, e.text("type")));
+  refuse(cached && e.text("basis") == "view",
+         "basis = \"view\" holds light for one camera and is never cached; leave 'basis' at auto "
+         "with a 'cache'");
+  if (e.text("type") != "photosphere" || cached) return;  // the cache decides; see light_stage.cpp
+  try {
+    checkLayout(layout);
+  } catch (const ConfigError& error) {
+    throw ConfigError(fmt::format("{}: {}", place, error.what()));
+  }
+  if (!e.text("preset").empty()) return;  // it gives keys that another may leave without work
+  const bool smooths = layout.angularKernel != sphere::AngularKernel::none;
+  const ParamValues defaults(estimatorParams());
+  const auto changed = [&](std::string_view key) { return e.format(key) != defaults.format(key); };
+  refuse(!smooths && (changed("bandwidth") || changed("truncation")),
+         "'bandwidth' and 'truncation' are those of 'kernel': set kernel = \"gaussian\" or "
+         "\"epanechnikov\"");
+  refuse(changed("directions") &&
+             !(layout.merge == Merge::sampled && layout.evaluate == Evaluate::perStep),
+         "'directions' are restored with merge = \"sampled\" and evaluate = \"per_step\" alone; "
+         "elsewhere directions are integrated");
+}
+
+std::string describeLayout(const LightFieldLayout& l) {
+  std::string text = fmt::format(
+      "{}, {}, {}, {} channel{}{}", l.carrier == Carrier::particles ? "particles" : "voxels",
+      l.basis == Basis::view ? "view"
+      : l.basis == Basis::sphericalHarmonics
+          ? fmt::format("{} spherical harmonics (order {})", l.bins(), l.order)
+          : fmt::format("histogram of {} bins ({} rows)", l.bins(), l.rows),
+      l.deposit == Deposit::collision ? "collision" : "track_length", l.channels,
+      l.channels == 1 ? "" : "s",
+      l.holdsPower() ? (l.energy == EnergyRule::scatter ? ", scatter" : ", gather") : "");
+  if (l.direction == sphere::DirectionDeposit::barycentric) text += ", direction barycentric";
+  if (l.direction == sphere::DirectionDeposit::kernel) text += ", direction kernel";
+  if (l.representative == Representative::mean) text += ", representative mean";
+  if (l.merge == Merge::sampled) text += ", merge sampled";
+  if (l.evaluate == Evaluate::perStep) text += ", evaluate per_step";
+  if (l.angularKernel != sphere::AngularKernel::none)
+    text += fmt::format(
+        ", kernel {} of bandwidth {} cut at {}",
+        l.angularKernel == sphere::AngularKernel::gaussian ? "gaussian" : "epanechnikov",
+        l.bandwidth, l.truncation);
+  if (l.merge == Merge::sampled && l.evaluate == Evaluate::perStep)
+    text += fmt::format(", {} restored directions", l.directions);
+  return text;
+}
+
+}  // namespace photosphere::scene

@@ -1,0 +1,157 @@
+#include "contenders.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "photosphere/core/error.h"
+
+namespace photosphere::study {
+
+const std::vector<Family>& families() {
+  static const std::vector<Family> table = {
+      {"view", "photosphere, view", {"estimator.basis=view"}},
+      {"view_fine",
+       "photosphere, view, fine light voxels",
+       {"estimator.basis=view", "estimator.light_voxel=1"}},
+      {"histogram_32", "photosphere, 32 bins", {"estimator.basis=histogram", "estimator.rows=2"}},
+      {"histogram_128", "photosphere, 128 bins", {"estimator.basis=histogram", "estimator.rows=4"}},
+      {"harmonics",
+       "photosphere, harmonics of order 4",
+       {"estimator.basis=spherical_harmonics", "estimator.order=4"}},
+      {"particles_view",
+       "photosphere on particles, view",
+       {"estimator.carrier=particles", "estimator.basis=view"},
+       Work::photons,
+       true},
+      {"particles_collision",
+       "photosphere on particles, collisions, 32 bins",
+       {"estimator.carrier=particles", "estimator.deposit=collision", "estimator.basis=histogram",
+        "estimator.rows=2"},
+       Work::photons,
+       true},
+      {"paper",
+       "photosphere, settings of the paper",
+       {"estimator.preset=paper"},
+       Work::photons,
+       true},
+      {"photon_map", "photon map", {"estimator.type=photon_map"}},
+      {"photon_map_progressive",
+       "photon map, 8 progressive passes",
+       {"estimator.type=photon_map", "estimator.passes=8"}},
+      {"path_traced", "path tracing", {"estimator.type=path_traced"}, Work::samples},
+      {"single", "single scattering alone", {"estimator.type=single"}, Work::none},
+  };
+  return table;
+}
+
+std::string familyTitle(const std::string& name) {
+  for (const Family& family : families())
+    if (family.name == name) return std::string(family.title);
+  return name;
+}
+
+SweepSize SweepSize::full() {
+  return {{16'000, 64'000, 256'000, 1'024'000, 4'096'000, 16'384'000},
+          {4, 16, 64, 256, 1024, 4096},
+          {}};
+}
+
+SweepSize SweepSize::quick() {
+  return {{1'000, 4'000}, {1, 4}, {"view", "histogram_32", "path_traced", "single"}};
+}
+
+SweepSize SweepSize::hardCase(bool quick) {
+  SweepSize size{{64'000, 1'024'000},
+                 {16, 256},
+                 {"view", "histogram_32", "particles_view", "photon_map", "path_traced", "single"}};
+  if (quick) size = {{1'000}, {2}, {"view", "path_traced"}};
+  return size;
+}
+
+std::string formatCount(std::int64_t count) {
+  if (count >= 1'000'000) return fmt::format("{:.3g}M", static_cast<double>(count) / 1e6);
+  if (count >= 1000) return fmt::format("{:.4g}k", static_cast<double>(count) / 1e3);
+  return std::to_string(count);
+}
+
+std::vector<std::string> neutralEstimator(const scene::SceneFile& scene) {
+  std::vector<std::string> sets;
+  const ParamValues defaults(scene.estimator.rows());
+  for (const Param& row : scene.estimator.rows())
+    if (scene.estimator.given(row.name))
+      sets.push_back(fmt::format("estimator.{}={}", row.name, defaults.format(row.name)));
+  return sets;
+}
+
+namespace {
+
+void checkNames(const SweepSize& size) {
+  std::vector<std::string_view> known;
+  for (const Family& family : families())
+    known.push_back(family.name);
+  for (const std::string& name : size.families)
+    if (std::find(known.begin(), known.end(), name) == known.end())
+      throw ConfigError(fmt::format("--family: unknown family '{}'{} (known: {})", name,
+                                    suggestion(name, known), fmt::join(known, ", ")));
+}
+
+Contender contender(const Family& family, int level, std::int64_t work) {
+  Contender c{&family, level, work, family.sets, std::string(family.title)};
+  if (family.work == Work::photons) {
+    c.sets.push_back(fmt::format("estimator.photons={}", work));
+    c.label += fmt::format(", {} photons", formatCount(work));
+  } else if (family.work == Work::samples) {
+    c.sets.push_back(fmt::format("estimator.samples={}", work));
+    c.label += fmt::format(", {} samples a pixel", work);
+  }
+  return c;
+}
+
+// The scene refuses what it does not serve, or why it does.
+bool accepts(const SceneSource& scene, const Contender& c, std::string& why) {
+  try {
+    scene.open(c.sets);
+    return true;
+  } catch (const ConfigError& error) {
+    why = error.what();
+    return false;
+  }
+}
+
+}  // namespace
+
+std::vector<Contender> contenders(const SceneSource& scene, const SweepSize& size,
+                                  const std::vector<std::string>& particleSets,
+                                  std::vector<LeftOut>& leftOut) {
+  checkNames(size);
+  const SceneSource neutral = scene.with(neutralEstimator(scene.open()));
+  std::vector<Contender> found;
+  for (const Family& family : families()) {
+    const bool wanted =
+        size.families.empty() ||
+        std::find(size.families.begin(), size.families.end(), family.name) != size.families.end();
+    if (!wanted) continue;
+    const std::vector<std::int64_t> works = family.work == Work::photons   ? size.photons
+                                            : family.work == Work::samples ? size.samples
+                                                                           : std::vector{0L};
+    for (std::size_t level = 0; level < works.size(); ++level) {
+      Contender c = contender(family, static_cast<int>(level), works[level]);
+      if (family.needsParticles)
+        c.sets.insert(c.sets.end(), particleSets.begin(), particleSets.end());
+      std::string why;
+      if (!accepts(neutral, c, why)) {
+        leftOut.push_back({std::string(family.title), why});
+        break;
+      }
+      const std::vector<std::string> reset = neutralEstimator(scene.open());
+      c.sets.insert(c.sets.begin(), reset.begin(), reset.end());
+      found.push_back(std::move(c));
+    }
+  }
+  std::stable_sort(found.begin(), found.end(),
+                   [](const Contender& a, const Contender& b) { return a.level < b.level; });
+  return found;
+}
+
+}  // namespace photosphere::study

@@ -1,0 +1,217 @@
+#include "photosphere/study/paper.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <map>
+
+#include "child.h"
+#include "contenders.h"
+#include "machine.h"
+#include "paper_exhibits.h"
+#include "particle_cache.h"
+#include "photosphere/core/error.h"
+#include "photosphere/core/log.h"
+#include "photosphere/core/progress.h"
+#include "photosphere/core/resources.h"
+#include "photosphere/core/version.h"
+#include "photosphere/estimators/photon_map.h"
+#include "photosphere/image/exr.h"
+#include "photosphere/image/exr_attributes.h"
+#include "reference.h"
+
+namespace photosphere::study {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr int kEdge = 96, kQuickEdge = 16;
+constexpr std::int64_t kPhotons = 200'000, kQuickPhotons = 2'000;
+constexpr int kRepeats = 3;
+constexpr double kMinutes = 20, kQuickMinutes = 0.2;
+/// Part of the time that references may take.
+constexpr double kReferenceShare = 0.25;
+
+class Paper {
+ public:
+  explicit Paper(const StudyOptions& options)
+      : m_options(options),
+        m_cache(options.cache.empty() ? options.output / "cache" : options.cache),
+        m_runs(m_cache / fmt::format("runs-{}", getpid())),
+        m_edge(options.quick ? kQuickEdge : kEdge),
+        m_plans(paperExhibits(options.quick ? kQuickPhotons : kPhotons)) {
+    m_minutes = options.minutes > 0 ? options.minutes : options.quick ? kQuickMinutes : kMinutes;
+  }
+
+  PaperResult run() {
+    PaperResult result;
+    result.version = versionText();
+    result.machine = machineName();
+    result.date = image::currentCapDate();
+    result.threads = m_options.threads;
+    result.minutes = m_minutes;
+    result.quick = m_options.quick;
+    result.width = result.height = m_edge;
+    std::size_t frames = 0;
+    for (const ExhibitPlan& plan : m_plans)
+      frames += plan.frames.size();
+    Progress progress("paper", frames);
+    for (const ExhibitPlan& plan : m_plans) {
+      PaperExhibit exhibit{plan.name, plan.title,    plan.said, plan.differs,
+                           plan.unit, plan.pictures, {}};
+      for (const PaperFrame& frame : plan.frames) {
+        exhibit.rows.push_back(measure(frame));
+        if (result.renderingSpace.empty())
+          result.renderingSpace = sceneOf(frame).open().output.text("colorspace");
+        progress.add(1);
+      }
+      result.exhibits.push_back(std::move(exhibit));
+    }
+    result.elapsedSeconds = m_watch.seconds();
+    return result;
+  }
+
+ private:
+  bool late(double share = 1) const { return m_watch.seconds() > 60 * m_minutes * share; }
+
+  SceneSource sceneOf(const PaperFrame& frame) const {
+    const fs::path studies = shippedStudies();
+    if (studies.empty())
+      throw InputMissingError("data/studies",
+                              "the scenes of --paper are not found; set PHOTOSPHERE_DATA to the "
+                              "folder that holds studies/");
+    SceneSource source{studies / (frame.smoke + ".toml"), {}};
+    source.sets = {
+        fmt::format("camera.resolution=[{}, {}]", m_edge, m_edge),
+        fmt::format("volume.0.phase={{ type = \"henyey_greenstein\", g = {} }}", frame.g)};
+    return source;
+  }
+
+  PaperRow measure(const PaperFrame& frame) {
+    PaperRow row;
+    row.label = frame.label;
+    row.paperValue = frame.paperValue;
+    row.settings = fmt::format("{}", fmt::join(frame.sets, "; "));
+    try {
+      SceneSource source = sceneOf(frame);
+      const SceneSource bare = source;
+      const auto particles = particleSets(source, {frame.frame}, frame.particles, true, m_cache);
+      source = source.with(frame.sets).with(particles);
+      const scene::SceneFile scene = source.open();
+      countLight(frame, scene, row);
+      render(frame, scene, bare, row);
+    } catch (const ConfigError& error) {
+      row.why = error.what();
+    }
+    return row;
+  }
+
+  void countLight(const PaperFrame& frame, const scene::SceneFile& scene, PaperRow& row) const {
+    if (frame.stored == StoredLight::forecast)
+      row.lightBytes = static_cast<double>(sceneFacts(scene, frame.frame).lightBytes);
+    if (frame.stored == StoredLight::photons)
+      row.lightBytes = static_cast<double>(estimators::photonMapBytes({}, frame.photonsStored));
+  }
+
+  void render(const PaperFrame& frame, const scene::SceneFile& scene, const SceneSource& bare,
+              PaperRow& row) {
+    std::vector<double> seconds, memory;
+    std::vector<image::Image> images;
+    for (int i = 0; i < kRepeats; ++i) {
+      if (i > 0 && late()) break;
+      RenderJob job;
+      job.scene = scene;
+      job.frame = frame.frame;
+      job.request.seed = 1 + i;
+      job.image = m_runs.path() / "paper.exr";
+      const RenderOutcome outcome = renderInChild(job);
+      if (outcome.failed) {
+        row.why = outcome.message;
+        return;
+      }
+      seconds.push_back(outcome.seconds.resolve + outcome.seconds.march);
+      memory.push_back(static_cast<double>(outcome.peakMemoryBytes));
+      images.push_back(image::readExr(job.image).image);
+    }
+    row.seconds = spreadOf(seconds);
+    row.peakMemoryBytes = spreadOf(memory);
+    row.measured = true;
+    judge(frame, bare, images, row);
+    row.frame = images.front();
+  }
+
+  void judge(const PaperFrame& frame, const SceneSource& bare,
+             const std::vector<image::Image>& images, PaperRow& row) {
+    const ReferenceImage& reference = referenceOf(frame, bare);
+    std::vector<Planes> seeds;
+    for (const image::Image& image : images) {
+      Planes planes;
+      for (const char* letter : {"R", "G", "B"})
+        planes.push_back(image.channel(std::string("multiple.") + letter));
+      seeds.push_back(std::move(planes));
+    }
+    const ErrorFigures figures =
+        errorFigures(seeds, reference.mean(kMultiple), reference.variance(kMultiple), {});
+    row.meanRatio = figures.meanRatio;
+    row.relativeError = relativeError(figures);
+    row.judged = true;
+  }
+
+  const ReferenceImage& referenceOf(const PaperFrame& frame, const SceneSource& bare) {
+    const std::string name = fmt::format("paper-{}-{}-g{}", frame.smoke, frame.frame, frame.g);
+    const bool white = std::any_of(frame.sets.begin(), frame.sets.end(),
+                                   [](const std::string& s) { return s.rfind("light.", 0) == 0; });
+    const std::string id = name + (white ? "-white" : "");
+    const auto found = m_references.find(id);
+    if (found != m_references.end()) return found->second;
+    SceneSource source = bare;
+    for (const std::string& set : frame.sets)
+      if (set.rfind("light.", 0) == 0) source.sets.push_back(set);
+    const scene::SceneFile base = source.open();
+    ReferenceMaker maker(source.open({"estimator.type=path_traced"}), frame.frame, id,
+                         referenceKey(base, frame.frame, sceneFacts(base, frame.frame).mediumHash),
+                         m_cache, m_options.quick ? 4 : 64);
+    const Stopwatch watch;
+    // About eight references share the time that is theirs.
+    const double most = kReferenceShare * 60 * m_minutes / 8;
+    while (maker.image().pairs < 2 ||
+           (maker.samplesBefore() == 0 && watch.seconds() + maker.pairSeconds() < most))
+      maker.addPair();
+    return m_references.emplace(id, maker.image()).first->second;
+  }
+
+  const StudyOptions& m_options;
+  fs::path m_cache;
+  RunFolder m_runs;
+  int m_edge;
+  double m_minutes = 0;
+  std::vector<ExhibitPlan> m_plans;
+  Stopwatch m_watch;
+  std::map<std::string, ReferenceImage> m_references;
+};
+
+double ratio(double value, double base) {
+  return value > 0 && base > 0 ? value / base : 0;
+}
+
+double ourValue(const PaperExhibit& exhibit, const PaperRow& row) {
+  return exhibit.unit == "bytes" ? row.lightBytes : row.measured ? row.seconds.median : 0;
+}
+
+}  // namespace
+
+double ourRatio(const PaperExhibit& exhibit, const PaperRow& row) {
+  return ratio(ourValue(exhibit, row), ourValue(exhibit, exhibit.rows.front()));
+}
+
+double papersRatio(const PaperExhibit& exhibit, const PaperRow& row) {
+  return ratio(row.paperValue, exhibit.rows.front().paperValue);
+}
+
+PaperResult runPaper(const StudyOptions& options) {
+  return Paper(options).run();
+}
+
+}  // namespace photosphere::study

@@ -1,0 +1,20 @@
+#pragma once
+// The tables of the page.
+
+#include "curves.h"
+#include "html.h"
+#include "photosphere/study/result.h"
+
+namespace photosphere::study {
+
+Table pointTable(const SweepResult& sweep);
+Table errorTable(const SweepResult& sweep, std::size_t layer, std::size_t region);
+Table equalTimeTable(const std::vector<Curve>& curves);
+Table equalErrorTable(const std::vector<Curve>& curves);
+Table crossoverTable(const std::vector<Curve>& curves);
+Table hardCaseTable(const StudyResult& result);
+Table flickerTable(const StudyResult& result);
+Table leftOutTable(const StudyResult& result);
+Table referenceTable(const StudyResult& result);
+
+}  // namespace photosphere::study

@@ -1,0 +1,19 @@
+#pragma once
+// The figures of a study as CSV and JSON.
+
+#include <string>
+
+#include "photosphere/study/result.h"
+
+namespace photosphere::study {
+
+/// A field of RFC 4180: quoted where it holds a comma, a quote or a line break. One that a
+/// spreadsheet would take for a formula begins with an apostrophe.
+std::string csvField(const std::string& text);
+
+/// One row for every point, layer and region; the header row names the units. Lines end in CR LF.
+std::string csvText(const StudyResult& result);
+/// Always valid JSON: what is not finite is null, what is not UTF-8 is replaced.
+std::string jsonText(const StudyResult& result);
+
+}  // namespace photosphere::study
