@@ -25,10 +25,11 @@ constexpr std::vector<Rgb> FrameLayers::*kColours[] = {
 void FrameMean::add(const FrameLayers& frame) {
   if (m_count++ == 0) {
     m_sum = frame;
-    for (std::size_t i = 0; i < frame.depth.size(); ++i)
-      m_sum.depth[i] *= frame.alpha[i];
     return;
   }
+  if (m_count == 2)
+    for (std::size_t i = 0; i < m_sum.depth.size(); ++i)
+      m_sum.depth[i] *= m_sum.alpha[i];
   for (const auto layer : kColours)
     addTo(m_sum.*layer, frame.*layer);
   addTo(m_sum.alpha, frame.alpha);
@@ -42,7 +43,7 @@ void FrameMean::add(const FrameLayers& frame) {
 
 FrameLayers FrameMean::mean() const {
   FrameLayers out = m_sum;
-  if (m_count == 0) return out;
+  if (m_count < 2) return out;
   for (std::size_t i = 0; i < out.depth.size(); ++i)
     out.depth[i] = m_sum.alpha[i] > 0.0f ? m_sum.depth[i] / m_sum.alpha[i] : kNoDepth;
   const float factor = 1.0f / static_cast<float>(m_count);

@@ -73,6 +73,9 @@ image::ExrAttributes header(const FrameResult& result,
   own["medium_hash"] = s.mediumHash;
   own["seed"] = std::to_string(result.seed);
   own["effects"] = effectsText(s.effects);
+  if (s.error)
+    own["error"] = fmt::format("{:.4g} relative (noise {:.4g}, bias {:.4g}) from {} batches",
+                               s.error->total(), s.error->noise, s.error->bias, s.batches);
   own["seconds"] = secondsText(s.seconds);
   own["peak_memory_bytes"] = std::to_string(s.peakMemoryBytes);
   return image::frameAttributes(metadata);
@@ -105,6 +108,7 @@ image::Image frameImage(const FrameResult& result, const std::vector<std::string
       {"transmittance", &render::FrameLayers::transmittance}};
   for (const auto& [name, pixels] : colours)
     if (wanted(name)) copyLayer(out, name, image::ChannelKind::color, layers.*pixels);
+  if (wanted("error")) copyLayer(out, "error", image::ChannelKind::data, result.error);
   if (wanted("depth")) copyPlane(out, "Z", layers.depth);
   return out;
 }

@@ -98,7 +98,7 @@ estimators::LightField lightField(const SceneFile& scene, const RenderRequest& r
     return readField(scene, request.allowStale, setup, statistics);
   const Stopwatch watch;
   transport::TraceOptions options;
-  options.photons = static_cast<std::uint64_t>(scene.estimator.integer("photons"));
+  options.photons = setup.photons;
   options.key = setup.key;
   transport::TraceStatistics traced;
   estimators::LightField field = estimators::traceLightField(
@@ -106,14 +106,14 @@ estimators::LightField lightField(const SceneFile& scene, const RenderRequest& r
   addTraced(traced, statistics);
   // Every flight after a scattering or from the smoke's own emission leaves light; the first one of
   // a lamp does where lamps with extent are kept.
-  statistics.photonsStored =
+  statistics.photonsStored +=
       setup.layout.unscattered ? traced.flights : traced.scatterings + traced.born;
   statistics.lightMemoryBytes = field.memoryBytes();
   if (field.farPhotons > 0)
     setup.notes.push_back(fmt::format(
         "{} photons met no particle within the deposit radius and went to the nearest one",
         field.farPhotons));
-  statistics.seconds.trace = watch.seconds();
+  statistics.seconds.trace += watch.seconds();
   return field;
 }
 

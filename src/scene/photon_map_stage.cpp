@@ -21,8 +21,8 @@ std::uint32_t neighbors(const ParamValues& e) {
 }
 
 // The whole progressive trace, of which pass i is the photons [i n, (i + 1) n).
-transport::TraceOptions traceOptions(const SceneFile& scene, const FrameSetup& setup, int pass) {
-  const auto each = static_cast<std::uint64_t>(scene.estimator.integer("photons"));
+transport::TraceOptions traceOptions(const FrameSetup& setup, int pass) {
+  const std::uint64_t each = setup.photons;
   transport::TraceOptions options;
   options.photons = each * static_cast<std::uint64_t>(setup.photonMap->passes);
   options.firstPhoton = each * static_cast<std::uint64_t>(pass);
@@ -45,25 +45,26 @@ void planPhotonMap(const SceneFile& scene, FrameSetup& setup) {
   map.directionKernel = {setup.layout.angularKernel, setup.layout.bandwidth,
                          setup.layout.truncation};
   const estimators::PhotonForecast forecast = estimators::forecastPhotons(
-      *setup.medium, setup.lights, map.unscattered, traceOptions(scene, setup, 0));
+      *setup.medium, setup.lights, map.unscattered, traceOptions(setup, 0));
   setup.photonMapPhotons = forecast.photons;
+  estimators::PhotonForecast whole = forecast;  // of all batches, whose mean the frame is
+  whole.photons *= static_cast<std::uint64_t>(setup.batches);
   map.radius = e.real("radius") * setup.space.metersPerUnit;
   if (map.radius > 0) return;
   // Where the nearest photons make the radius, the automatic one only keeps it from growing over
   // empty space.
   map.radius = e.integer("neighbors") > 0 ? kWidestBall * setup.medium->voxelEdge()
-                                          : estimators::automaticRadius(*setup.medium, forecast);
+                                          : estimators::automaticRadius(*setup.medium, whole);
 }
 
-std::unique_ptr<estimators::PhotonMap> photonMapPass(const SceneFile& scene,
-                                                     const FrameSetup& setup, int pass,
-                                                     FrameStatistics& statistics) {
+std::unique_ptr<estimators::PhotonMap> photonMapPass(const FrameSetup& setup, int pass,
+                                                     double widening, FrameStatistics& statistics) {
   const Stopwatch watch;
   PhotonMapLayout layout = *setup.photonMap;
-  layout.radius *= estimators::progressiveRadiusFactor(pass);
+  layout.radius *= widening * estimators::progressiveRadiusFactor(pass);
   transport::TraceStatistics traced;
   auto map = estimators::tracePhotonMap(*setup.medium, setup.lights, layout,
-                                        traceOptions(scene, setup, pass), traced);
+                                        traceOptions(setup, pass), traced);
   addTraced(traced, statistics);
   statistics.photonsStored += map->photons();
   statistics.lightMemoryBytes = std::max(statistics.lightMemoryBytes, map->memoryBytes());

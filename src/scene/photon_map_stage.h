@@ -11,8 +11,8 @@ namespace photosphere::scene {
 void planPhotonMap(const SceneFile& scene, FrameSetup& setup);
 
 /// Traces the map of one pass, which has photons and radius of its own, and adds up its statistics.
-std::unique_ptr<estimators::PhotonMap> photonMapPass(const SceneFile& scene,
-                                                     const FrameSetup& setup, int pass,
-                                                     FrameStatistics& statistics);
+/// @param widening  of the radius, to see what it does
+std::unique_ptr<estimators::PhotonMap> photonMapPass(const FrameSetup& setup, int pass,
+                                                     double widening, FrameStatistics& statistics);
 
 }  // namespace photosphere::scene

@@ -103,24 +103,46 @@ std::string describe(const estimators::PhotonMapLayout& map) {
                      map.passes > 1 ? fmt::format(", {} passes", map.passes) : "");
 }
 
+using Source = std::unique_ptr<estimators::InscatterSource>;
+
 // The light of one pass of a frame, ready to be looked up; null where nothing asks for it.
-std::unique_ptr<estimators::InscatterSource> prepareLight(const SceneFile& scene,
-                                                          const RenderRequest& request, int pass,
-                                                          FrameSetup& setup, FrameResult& result) {
-  if (!storesLight(scene, setup)) return nullptr;
+struct PassLight {
+  Source source;
+  Source wider;  // the same photons through a wider kernel, where that is asked for
+};
+
+// How much wider.
+constexpr double kWidening = 1.5;
+
+Source widened(const FrameSetup& setup, estimators::LightField field) {
+  // A kernel narrower than a light voxel does nothing: the voxel itself is the width there.
+  const double edge = field.layout.lightVoxel * setup.medium->voxelEdge();
+  field.layout.radius = kWidening * std::max(field.layout.radius, edge);
+  return estimators::resolve(*setup.medium, std::move(field), setup.view, setup.key);
+}
+
+PassLight prepareLight(const SceneFile& scene, const RenderRequest& request, int pass, bool wider,
+                       FrameSetup& setup, FrameResult& result) {
+  PassLight light;
+  if (!storesLight(scene, setup)) return light;
   if (setup.photonMap) {
     result.layout = describe(*setup.photonMap);
     result.radius = setup.photonMap->radius / setup.space.metersPerUnit;
-    return photonMapPass(scene, setup, pass, result.statistics);
+    light.source = photonMapPass(setup, pass, 1.0, result.statistics);
+    FrameStatistics again;
+    if (wider) light.wider = photonMapPass(setup, pass, kWidening, again);
+    return light;
   }
   estimators::LightField field = lightField(scene, request, setup, result.statistics);
   result.layout = describeLayout(setup.layout);
   result.radius = setup.layout.radius / setup.space.metersPerUnit;
   const Stopwatch watch;
+  if (wider) light.wider = widened(setup, field);
   auto source = estimators::resolve(*setup.medium, std::move(field), setup.view, setup.key);
-  result.statistics.seconds.resolve = watch.seconds();
+  result.statistics.seconds.resolve += watch.seconds();
   noteClamped(source->clampedShare(), setup, result.statistics);
-  return source;
+  light.source = std::move(source);
+  return light;
 }
 
 std::uint64_t shadowBudget(const FrameSetup& setup) {
@@ -132,12 +154,12 @@ std::uint64_t shadowBudget(const FrameSetup& setup) {
 render::FrameOptions frameOptions(const SceneFile& scene, const RenderRequest& request,
                                   const FrameSetup& setup, bool paths) {
   render::FrameOptions options;
-  options.samples = static_cast<int>(paths ? scene.estimator.integer("samples")
-                                           : scene.render.integer("samples"));
+  const auto samples = static_cast<int>(paths ? scene.estimator.integer("samples")
+                                              : scene.render.integer("samples"));
+  options.samples = (samples + setup.batches - 1) / setup.batches;
   options.filter = filterKind(scene.render.text("filter"));
   options.filterWidth = scene.render.real("filter_width");
   options.crop = clippedCrop(request.crop, setup.camera->resolution());
-  options.key = setup.key;
   options.space = setup.space;
   return options;
 }
@@ -168,6 +190,7 @@ class LayerRenderer {
   /// @param source  the estimator's answer; may be null
   render::FrameLayers render(const estimators::InscatterSource* source, int pass) const {
     render::FrameOptions options = m_options;
+    options.key = m_setup.key;
     options.firstSample = pass * options.samples;
     const auto integrator =
         m_paths ? render::makePathIntegrator(*m_setup.medium, m_setup.lights, m_path)
@@ -187,25 +210,110 @@ class LayerRenderer {
   std::optional<render::Shadows> m_shadows;
 };
 
-// Light and rays, once, or again and again for a progressive photon map.
-void renderLayers(const SceneFile& scene, const RenderRequest& request, FrameSetup& setup,
-                  FrameResult& result) {
-  checkMemory(setup, storesLight(scene, setup) && scene.estimator.text("cache").empty());
-  const int passes = setup.photonMap ? setup.photonMap->passes : 1;
-  std::optional<LayerRenderer> renderer;
-  render::FrameMean mean;
-  for (int pass = 0; pass < passes; ++pass) {
-    const auto source = prepareLight(scene, request, pass, setup, result);
-    const Stopwatch watch;
-    if (!renderer) renderer.emplace(scene, request, setup);
-    if (passes == 1)
-      result.layers = renderer->render(source.get(), 0);
-    else
-      mean.add(renderer->render(source.get(), pass));
-    result.statistics.seconds.march += watch.seconds();
-  }
-  if (passes > 1) result.layers = mean.mean();
+int cropWidth(const RenderRequest& request, const FrameSetup& setup) {
+  const render::Crop crop = clippedCrop(request.crop, setup.camera->resolution());
+  return crop.max.x - crop.min.x;
 }
+
+// The frame in independent batches, each of photons, samples and random numbers of its own, until
+// its error or the time is what was asked for.
+class FrameLoop {
+ public:
+  FrameLoop(const SceneFile& scene, const RenderRequest& request, FrameSetup& setup,
+            const Stopwatch& watch, FrameResult& result)
+      : m_scene(scene),
+        m_request(request),
+        m_setup(setup),
+        m_watch(watch),
+        m_result(result),
+        m_target(scene.render.real("target_error")),
+        m_timeLimit(scene.render.real("time_limit")),
+        m_passes(setup.photonMap ? setup.photonMap->passes : 1),
+        m_error(cropWidth(request, setup)) {}
+
+  void run() {
+    const RandomKey key = m_setup.key;
+    const auto seed = static_cast<std::uint64_t>(key.hi) << 32 | key.lo;
+    std::size_t notes = 0;
+    int batch = 0;
+    do {
+      if (batch > 0) m_setup.key = RandomKey::fromSeed(seed, batch);
+      renderBatch();
+      // What a batch has to say it says once.
+      if (batch == 0) notes = m_setup.notes.size();
+      m_setup.notes.resize(notes);
+    } while (!done(++batch));
+    m_setup.key = key;
+    if (!once()) m_result.layers = m_mean.mean();
+    m_result.statistics.batches = batch;
+    if (m_setup.batches > 1) reportError(batch);
+  }
+
+ private:
+  // One batch: all passes of a progressive photon map, one of everything else.
+  void renderBatch() {
+    const bool judged = m_setup.batches > 1;
+    const bool wider = m_target > 0 && m_error.batches() < m_setup.batches;
+    for (int pass = 0; pass < m_passes; ++pass) {
+      const PassLight light = prepareLight(m_scene, m_request, pass, wider, m_setup, m_result);
+      const Stopwatch watch;
+      if (!m_renderer) m_renderer.emplace(m_scene, m_request, m_setup);
+      render::FrameLayers layers = m_renderer->render(light.source.get(), pass);
+      if (!once()) m_mean.add(layers);
+      if (light.wider)
+        m_error.add(layers.beauty, m_renderer->render(light.wider.get(), pass).beauty, kWidening);
+      else if (judged)
+        m_error.add(layers.beauty);
+      if (once()) m_result.layers = std::move(layers);
+      m_result.statistics.seconds.march += watch.seconds();
+    }
+  }
+
+  bool once() const { return m_setup.batches == 1 && m_passes == 1; }
+
+  bool done(int batches) {
+    if (m_timeLimit > 0 && m_watch.seconds() > m_timeLimit) return true;
+    if (batches < m_setup.batches) return false;
+    if (!(m_target > 0)) return true;
+    const ErrorEstimate e = m_error.estimate();
+    // Photons do not mend a bias.
+    return e.total() <= m_target || (e.bias >= m_target && e.noise < 0.5 * e.bias);
+  }
+
+  void reportError(int batches) {
+    FrameStatistics& s = m_result.statistics;
+    // Every batch traced all the light there is.
+    for (Vec3d* power : {&s.energyEmitted, &s.energyMissed, &s.energyAbsorbed, &s.energyEscaped,
+                         &s.energyCapped, &s.energyError})
+      *power /= static_cast<double>(batches);
+    if (batches < 2) {
+      s.targetMissed = m_target > 0;
+      return;
+    }
+    s.error = m_error.estimate();
+    s.targetMissed = m_target > 0 && (batches < m_setup.batches || s.error->total() > m_target);
+    m_result.error = m_error.standardError();
+    m_result.layerNames.emplace_back("error");
+    if (!s.targetMissed) return;
+    m_setup.notes.push_back(
+        fmt::format("the estimated error {:.4g} (noise {:.4g}, bias {:.4g}) misses "
+                    "render.target_error {:.4g}: {}",
+                    s.error->total(), s.error->noise, s.error->bias, m_target,
+                    s.error->bias >= m_target ? "lower estimator.radius or light_voxel"
+                                              : "raise render.time_limit"));
+  }
+
+  const SceneFile& m_scene;
+  const RenderRequest& m_request;
+  FrameSetup& m_setup;
+  const Stopwatch& m_watch;
+  FrameResult& m_result;
+  double m_target, m_timeLimit;
+  int m_passes;
+  std::optional<LayerRenderer> m_renderer;
+  render::FrameMean m_mean;
+  FrameError m_error;
+};
 
 void finish(const FrameSetup& setup, double cpuBefore, FrameResult& result) {
   FrameStatistics& s = result.statistics;
@@ -261,7 +369,8 @@ FrameResult renderScene(const SceneFile& scene, std::int64_t frame, const Render
   result.estimator = scene.estimator.text("type");
   result.seed = request.seed.value_or(scene.scene.integer("seed"));
 
-  renderLayers(scene, request, setup, result);
+  checkMemory(setup, storesLight(scene, setup) && scene.estimator.text("cache").empty());
+  FrameLoop(scene, request, setup, total, result).run();
   result.notes = setup.notes;
   finish(setup, cpuBefore, result);
   checkSamples(result.layers);

@@ -418,15 +418,17 @@ std::span<const Param> renderParams() {
       {.name = "time_limit",
        .unit = "s",
        .defaultText = "0.0",
-       .help = "for a frame; 0 = none",
-       .min = 0,
-       .served = false},
+       .help =
+           "for a frame; 0 = none. The frame is then rendered in eight parts, and ends with the "
+           "part that passes the limit",
+       .min = 0},
       {.name = "target_error",
        .unit = "",
        .defaultText = "0.0",
-       .help = "stop when the estimated relative error is below; 0 = off",
-       .min = 0,
-       .served = false},
+       .help = "stop when the estimated relative error, sqrt(relMSE), is below; 0 = off. The frame "
+               "is rendered in eight parts (photons and samples shared out), then goes on part by "
+               "part; exit 7 when time_limit, or a bias that photons cannot mend, comes first",
+       .min = 0},
       {.name = "memory_limit",
        .unit = "GiB",
        .defaultText = "0.0",

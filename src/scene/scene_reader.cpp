@@ -351,7 +351,16 @@ void SceneReader::read() {
 }
 
 void checkCombinations(const SceneFile& scene, const std::string& name) {
-  checkEstimator(scene.estimator, name + ": [estimator]");
+  const ParamValues& e = scene.estimator;
+  checkEstimator(e, name + ": [estimator]");
+  const bool target = scene.render.real("target_error") > 0;
+  if (target && !e.text("cache").empty())
+    throw ConfigError(name +
+                      ": [render]: 'target_error' needs photons of its own to judge by; remove "
+                      "estimator.cache");
+  if (target && e.text("type") == "photon_map" && e.integer("passes") > 1)
+    throw ConfigError(name +
+                      ": [render]: 'target_error' goes on by itself; leave estimator.passes at 1");
   const double limit = scene.render.real("memory_limit");
   if (limit < 0 && limit != -1)
     throw ConfigError(name +

@@ -38,6 +38,12 @@ std::string statsJson(const FrameStatistics& s) {
   json["majorant_violations"] = s.majorantViolations;
   if (s.pathsCapped > 0)
     json["paths_capped"] = {{"count", s.pathsCapped}, {"throughput", s.pathsCappedRadiance}};
+  if (s.error)
+    json["error"] = {{"estimate", s.error->total()},
+                     {"noise", s.error->noise},
+                     {"bias", s.error->bias},
+                     {"batches", s.batches},
+                     {"target_missed", s.targetMissed}};
   if (s.clampedLight > 0) json["clamped_light"] = s.clampedLight;
   json["effects"] = nlohmann::ordered_json::object();
   for (const EffectState& effect : s.effects)

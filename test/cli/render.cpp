@@ -241,6 +241,21 @@ TEST_F(Render, PhotonMapInPasses) {
   EXPECT_EQ(list.out.find("photon_map: more than 1 = progressive (not served"), std::string::npos);
 }
 
+TEST_F(Render, GoesOnToATargetError) {
+  RunResult result = render(
+      {"scene.toml", "-o", "a.exr", "--frames", "1", "--target-error", "0.5", "--stats", "s.json"});
+  ASSERT_EQ(result.exitCode, 0) << result.err;
+  const json error = json::parse(readText(m_folder / "s.json")).at("error");
+  EXPECT_GE(error.at("batches"), 8);
+  EXPECT_LE(error.at("estimate"), 0.5);
+  EXPECT_EQ(exr("a.exr").image.channel("error.R").size(), 16u * 12u);
+  // Missed: the frame is there all the same.
+  result = render({"scene.toml", "-o", "b.####.exr", "--frames", "1-2", "--target-error", "1e-6",
+                   "--time-limit", "1e-6"});
+  EXPECT_EQ(result.exitCode, 7) << result.err;
+  EXPECT_TRUE(image::exrIsComplete(m_folder / "b.0002.exr"));
+}
+
 TEST_F(Render, SignalEndsALongFrameWithoutTemporaries) {
   const auto before = namesIn(m_folder.path());
   const RunResult result = runShell(

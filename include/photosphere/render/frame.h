@@ -63,7 +63,7 @@ class FrameMean {
   FrameLayers mean() const;
 
  private:
-  FrameLayers m_sum;  // depth holds the sum of alpha times depth
+  FrameLayers m_sum;  // from two frames on, depth holds the sum of alpha times depth
   int m_count = 0;
 };
 

@@ -53,6 +53,10 @@ struct FrameSetup {
   estimators::LightFieldLayout layout;  ///< of type `photosphere`; radius chosen where it was 0
   std::optional<estimators::PhotonMapLayout> photonMap;  ///< of type `photon_map`; radius chosen
   std::uint64_t photonMapPhotons = 0;                    ///< that one pass is expected to store
+  /// Parts that photons and samples are shared out to where the frame's error is wanted: their
+  /// spread tells it. More follow until it is small enough.
+  int batches = 1;
+  std::uint64_t photons = 0;       ///< of one batch (and of each pass of it)
   std::uint64_t memoryBudget = 0;  ///< bytes that this frame may use; 0 = no limit
   double readSeconds = 0, rasterizeSeconds = 0;
   std::vector<std::string> notes;  ///< what the user should know

@@ -9,6 +9,7 @@
 #include "photosphere/image/exr.h"
 #include "photosphere/image/image.h"
 #include "photosphere/render/frame.h"
+#include "photosphere/scene/frame_error.h"
 #include "photosphere/scene/frame_setup.h"
 #include "photosphere/scene/scene_file.h"
 
@@ -43,6 +44,9 @@ struct FrameStatistics {
   std::uint64_t pathsCapped = 0;   ///< path_traced: ended by max_scatter
   double pathsCappedRadiance = 0;  ///< throughput they still carried, summed
   std::vector<EffectState> effects;
+  std::optional<ErrorEstimate> error;  ///< where render.target_error or time_limit asks for it
+  int batches = 1;                     ///< independent parts that the frame is the mean of
+  bool targetMissed = false;           ///< target_error was not reached (exit 7)
   double imageMean = 0, imageMax = 0;  ///< of R, G, B [W m^-2 sr^-1]
   std::string sceneHash, mediumHash;
 };
@@ -52,6 +56,7 @@ struct FrameResult {
   std::int64_t frame = 0;
   render::FrameLayers layers;
   FrameStatistics statistics;
+  std::vector<Rgb> error;               ///< standard error of `beauty`, where it is estimated
   std::vector<std::string> layerNames;  ///< layers this frame has, by their names in output.aovs
   Mat4d cameraFromWorld{1.0}, ndcFromWorld{1.0};
   double framesPerSecond = 24;

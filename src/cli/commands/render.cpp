@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <memory>
+#include <optional>
 
 #include "command.h"
 #include "frame_loop.h"
@@ -23,6 +24,8 @@ namespace {
 
 struct Options {
   SceneOptions scene;
+  std::optional<double> targetError, timeLimit;
+  bool targetMissed = false;  // by some frame
   std::string output, crop, compression = "zip";
   scene::WriteRequest write;
 };
@@ -46,7 +49,7 @@ std::optional<render::Crop> parseCrop(const std::string& text) {
   return crop;
 }
 
-void renderOne(const scene::SceneFile& scene, std::int64_t frame, const Options& options,
+void renderOne(const scene::SceneFile& scene, std::int64_t frame, Options& options,
                const scene::RenderRequest& request, StatsFile& stats) {
   checkWritable(framePath(options.write.path, frame));
   checkWritable(framePath(options.write.preview, frame));
@@ -60,9 +63,10 @@ void renderOne(const scene::SceneFile& scene, std::int64_t frame, const Options&
   printLine("frame {}: {}  mean {:.6g}, max {:.6g}  {}  peak {}", frame, path, s.imageMean,
             s.imageMax, formatSeconds(s.seconds), formatBytes(s.peakMemoryBytes));
   stats.add(frame, path, s);
+  options.targetMissed = options.targetMissed || s.targetMissed;
 }
 
-int renderFrames(const scene::SceneFile& scene, const Options& options) {
+int renderFrames(const scene::SceneFile& scene, Options& options) {
   const std::vector<std::int64_t> frames = sceneFrameList(scene, options.scene);
   checkOutputPattern(options.write.path, frames.size());
   if (!options.write.preview.empty()) checkOutputPattern(options.write.preview, frames.size());
@@ -71,7 +75,7 @@ int renderFrames(const scene::SceneFile& scene, const Options& options) {
   empty.volumes.clear();
   StatsFile stats(options.scene.stats, frames.size());
   bool planned = false;
-  return runFrames(frames, options.scene.frames.keepGoing, [&](std::int64_t frame) {
+  const int code = runFrames(frames, options.scene.frames.keepGoing, [&](std::int64_t frame) {
     const std::string path = framePath(options.write.path, frame);
     if (options.scene.frames.skipExisting && image::exrIsComplete(path))
       return printLine("frame {}: {} exists and is complete, skipped", frame, path);
@@ -86,11 +90,18 @@ int renderFrames(const scene::SceneFile& scene, const Options& options) {
     if (smoke && !std::exchange(planned, true)) printPlan(scene, frame, request, false);
     printDryRun(frame, path, cacheFrame, smoke);
   });
+  if (code != static_cast<int>(ExitCode::ok) || !options.targetMissed) return code;
+  return static_cast<int>(ExitCode::accuracy);
 }
 
 int runRender(Options& options) {
   parseCrop(options.crop);
   options.write.compression = image::parseExrCompression(options.compression);
+  // After -s: the option that is more explicit wins.
+  if (options.targetError)
+    options.scene.sets.push_back(fmt::format("render.target_error={}", *options.targetError));
+  if (options.timeLimit)
+    options.scene.sets.push_back(fmt::format("render.time_limit={}", *options.timeLimit));
   const scene::SceneFile scene = openScene(options.scene);
   if (options.scene.dumpScene) {
     printLine("{}", scene::dumpScene(scene));
@@ -113,6 +124,11 @@ std::function<int()> declareRender(CLI::App& app) {
   app.add_option("-o,--output", options->output, "EXR to write, with #### for several frames")
       ->type_name("OUT.exr");
   addSceneOptions(app, options->scene);
+  app.add_option("--target-error", options->targetError,
+                 "Go on until the estimated relative error is below; replaces render.target_error")
+      ->type_name("E");
+  app.add_option("--time-limit", options->timeLimit, "Seconds a frame; replaces render.time_limit")
+      ->type_name("S");
   const char* group = "Image";
   app.add_option("--crop", options->crop, "Part of the frame in pixels, X1 and Y1 exclusive")
       ->type_name("X0,Y0,X1,Y1")
