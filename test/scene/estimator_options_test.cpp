@@ -44,7 +44,7 @@ TEST(Preset, IsShownWhole) {
     const SceneFile scene = parse({"estimator.preset=" + std::string(preset.name)});
     const std::string dumped = dumpScene(scene);
     for (const PresetValue& value : preset.values)
-      EXPECT_TRUE(contains(dumped, "\n" + std::string(value.key) + " = ")) << value.key;
+      EXPECT_TRUE(contains(dumped, fmt::format("\n{} = ", value.key))) << value.key;
     EXPECT_EQ(dumpScene(parse({}, dumped)), dumped);
   }
   EXPECT_TRUE(
