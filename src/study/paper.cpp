@@ -27,7 +27,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr int kEdge = 96, kQuickEdge = 16;
+constexpr int kEdge = 64, kQuickEdge = 16;
 constexpr std::int64_t kPhotons = 200'000, kQuickPhotons = 2'000;
 constexpr int kRepeats = 3;
 constexpr double kMinutes = 20, kQuickMinutes = 0.2;
@@ -83,8 +83,9 @@ class Paper {
                               "the scenes of --paper are not found; set PHOTOSPHERE_DATA to the "
                               "folder that holds studies/");
     SceneSource source{studies / (frame.smoke + ".toml"), {}};
+    // One ray a pixel, as a renderer of 2010 would march: times are compared, not edges.
     source.sets = {
-        fmt::format("camera.resolution=[{}, {}]", m_edge, m_edge),
+        "render.samples=1", fmt::format("camera.resolution=[{}, {}]", m_edge, m_edge),
         fmt::format("volume.0.phase={{ type = \"henyey_greenstein\", g = {} }}", frame.g)};
     return source;
   }
@@ -94,6 +95,10 @@ class Paper {
     row.label = frame.label;
     row.paperValue = frame.paperValue;
     row.settings = fmt::format("{}", fmt::join(frame.sets, "; "));
+    if (late()) {
+      row.why = "the time given was spent; more --minutes measure it";
+      return row;
+    }
     try {
       SceneSource source = sceneOf(frame);
       const SceneSource bare = source;
