@@ -56,6 +56,7 @@ table { border-collapse: collapse; margin: 0 0 1rem; font-size: 0.85rem; }
 th, td { border-bottom: 1px solid #bbb; padding: 0.2rem 0.6rem; text-align: left;
          vertical-align: top; }
 th { border-bottom: 2px solid #111; vertical-align: bottom; }
+td:first-child { min-width: 15rem; }
 td.n, th.n { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
 figure { margin: 1rem 0; } figcaption { font-size: 0.9rem; max-width: 60rem; }
 .wide { overflow-x: auto; }

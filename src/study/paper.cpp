@@ -27,7 +27,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr int kEdge = 96, kQuickEdge = 16;
+constexpr int kEdge = 64, kQuickEdge = 16;
 constexpr std::int64_t kPhotons = 200'000, kQuickPhotons = 2'000;
 constexpr int kRepeats = 3;
 constexpr double kMinutes = 20, kQuickMinutes = 0.2;
@@ -54,27 +54,33 @@ class Paper {
     result.minutes = m_minutes;
     result.quick = m_options.quick;
     result.width = result.height = m_edge;
-    std::size_t frames = 0;
-    for (const ExhibitPlan& plan : m_plans)
-      frames += plan.frames.size();
-    Progress progress("paper", frames);
-    for (const ExhibitPlan& plan : m_plans) {
-      PaperExhibit exhibit{plan.name, plan.title,    plan.said, plan.differs,
-                           plan.unit, plan.pictures, {}};
-      for (const PaperFrame& frame : plan.frames) {
-        exhibit.rows.push_back(measure(frame));
-        if (result.renderingSpace.empty())
-          result.renderingSpace = sceneOf(frame).open().output.text("colorspace");
+    prepare(result);
+    Progress progress("paper", kRepeats * m_tasks.size());
+    // Every line once before any a second time: what time allows then covers all exhibits.
+    for (int repeat = 0; repeat < kRepeats; ++repeat)
+      for (Task& task : m_tasks) {
+        if (task.why.empty() && (repeat == 0 || !task.images.empty())) renderOnce(task, repeat);
         progress.add(1);
       }
-      result.exhibits.push_back(std::move(exhibit));
-    }
+    for (Task& task : m_tasks)
+      finish(task, result.exhibits[task.exhibit].rows[task.row]);
     result.elapsedSeconds = m_watch.seconds();
     return result;
   }
 
  private:
-  bool late(double share = 1) const { return m_watch.seconds() > 60 * m_minutes * share; }
+  // One line of an exhibit and what its runs gave.
+  struct Task {
+    const PaperFrame* frame = nullptr;
+    std::size_t exhibit = 0, row = 0;
+    SceneSource bare;  // the scene without the estimator's settings
+    scene::SceneFile scene;
+    std::vector<double> seconds, memory;
+    std::vector<image::Image> images;
+    std::string why;  // not measured
+  };
+
+  bool late() const { return m_watch.seconds() > 60 * m_minutes; }
 
   SceneSource sceneOf(const PaperFrame& frame) const {
     const fs::path studies = shippedStudies();
@@ -83,29 +89,48 @@ class Paper {
                               "the scenes of --paper are not found; set PHOTOSPHERE_DATA to the "
                               "folder that holds studies/");
     SceneSource source{studies / (frame.smoke + ".toml"), {}};
+    // One ray a pixel, as a renderer of 2010 would march: times are compared, not edges.
     source.sets = {
-        fmt::format("camera.resolution=[{}, {}]", m_edge, m_edge),
+        "render.samples=1", fmt::format("camera.resolution=[{}, {}]", m_edge, m_edge),
         fmt::format("volume.0.phase={{ type = \"henyey_greenstein\", g = {} }}", frame.g)};
     return source;
   }
 
-  PaperRow measure(const PaperFrame& frame) {
-    PaperRow row;
-    row.label = frame.label;
-    row.paperValue = frame.paperValue;
-    row.settings = fmt::format("{}", fmt::join(frame.sets, "; "));
-    try {
-      SceneSource source = sceneOf(frame);
-      const SceneSource bare = source;
-      const auto particles = particleSets(source, {frame.frame}, frame.particles, true, m_cache);
-      source = source.with(frame.sets).with(particles);
-      const scene::SceneFile scene = source.open();
-      countLight(frame, scene, row);
-      render(frame, scene, bare, row);
-    } catch (const ConfigError& error) {
-      row.why = error.what();
+  // Opens the scenes of all lines: what this version does not serve shows here.
+  void prepare(PaperResult& result) {
+    for (const ExhibitPlan& plan : m_plans) {
+      PaperExhibit exhibit{plan.name, plan.title,    plan.said, plan.differs,
+                           plan.unit, plan.pictures, {}};
+      for (const PaperFrame& frame : plan.frames) {
+        Task task;
+        task.frame = &frame;
+        task.exhibit = result.exhibits.size();
+        task.row = exhibit.rows.size();
+        PaperRow row;
+        row.label = frame.label;
+        row.paperValue = frame.paperValue;
+        row.settings = fmt::format("{}", fmt::join(frame.sets, "; "));
+        open(task, row);
+        exhibit.rows.push_back(std::move(row));
+        m_tasks.push_back(std::move(task));
+      }
+      result.exhibits.push_back(std::move(exhibit));
     }
-    return row;
+    result.renderingSpace = sceneOf(m_plans[0].frames[0]).open().output.text("colorspace");
+  }
+
+  void open(Task& task, PaperRow& row) {
+    const PaperFrame& frame = *task.frame;
+    task.bare = sceneOf(frame);
+    try {
+      const auto particles = particleSets(task.bare, {frame.frame}, frame.particles, true, m_cache);
+      task.scene = task.bare.with(frame.sets).with(particles).open();
+      countLight(frame, task.scene, row);
+    } catch (const InterruptedError&) {
+      throw;
+    } catch (const Error& error) {
+      task.why = error.what();
+    }
   }
 
   void countLight(const PaperFrame& frame, const scene::SceneFile& scene, PaperRow& row) const {
@@ -115,31 +140,34 @@ class Paper {
       row.lightBytes = static_cast<double>(estimators::photonMapBytes({}, frame.photonsStored));
   }
 
-  void render(const PaperFrame& frame, const scene::SceneFile& scene, const SceneSource& bare,
-              PaperRow& row) {
-    std::vector<double> seconds, memory;
-    std::vector<image::Image> images;
-    for (int i = 0; i < kRepeats; ++i) {
-      if (i > 0 && late()) break;
-      RenderJob job;
-      job.scene = scene;
-      job.frame = frame.frame;
-      job.request.seed = 1 + i;
-      job.image = m_runs.path() / "paper.exr";
-      const RenderOutcome outcome = renderInChild(job);
-      if (outcome.failed) {
-        row.why = outcome.message;
-        return;
-      }
-      seconds.push_back(outcome.seconds.resolve + outcome.seconds.march);
-      memory.push_back(static_cast<double>(outcome.peakMemoryBytes));
-      images.push_back(image::readExr(job.image).image);
+  void renderOnce(Task& task, int repeat) {
+    if (late()) {
+      if (repeat == 0) task.why = "the time given was spent; more --minutes measure it";
+      return;
     }
-    row.seconds = spreadOf(seconds);
-    row.peakMemoryBytes = spreadOf(memory);
+    RenderJob job;
+    job.scene = task.scene;
+    job.frame = task.frame->frame;
+    job.request.seed = 1 + repeat;
+    job.image = m_runs.path() / "paper.exr";
+    const RenderOutcome outcome = renderInChild(job);
+    if (outcome.failed) {
+      task.why = outcome.message;
+      return;
+    }
+    task.seconds.push_back(outcome.seconds.resolve + outcome.seconds.march);
+    task.memory.push_back(static_cast<double>(outcome.peakMemoryBytes));
+    task.images.push_back(image::readExr(job.image).image);
+  }
+
+  void finish(Task& task, PaperRow& row) {
+    row.why = task.why;
+    if (task.images.empty()) return;
+    row.seconds = spreadOf(task.seconds);
+    row.peakMemoryBytes = spreadOf(task.memory);
     row.measured = true;
-    judge(frame, bare, images, row);
-    row.frame = images.front();
+    judge(*task.frame, task.bare, task.images, row);
+    row.frame = std::move(task.images.front());
   }
 
   void judge(const PaperFrame& frame, const SceneSource& bare,
@@ -188,6 +216,7 @@ class Paper {
   int m_edge;
   double m_minutes = 0;
   std::vector<ExhibitPlan> m_plans;
+  std::vector<Task> m_tasks;
   Stopwatch m_watch;
   std::map<std::string, ReferenceImage> m_references;
 };

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "advice.h"
 #include "curves.h"
@@ -112,7 +113,7 @@ std::string pictures(const SweepResult& sweep, const PictureSettings& settings, 
   text += figure(pictureTag(framePicture(sweep.referenceImage, exposure, settings),
                             "reference of " + sweep.name, w, h),
                  fmt::format("reference, {} samples a pixel, exposure {:+.1f} stops",
-                             sweep.reference.samples, exposure));
+                             sweep.reference.samples, std::round(10 * exposure) / 10 + 0.0f));
   for (const PointResult& p : sweep.points) {
     if (p.frame.channels().empty()) continue;  // not the family's most work
     if (!allFamilies && p.family != "view" && p.family != "path_traced") continue;

@@ -313,8 +313,11 @@ SweepResult Sweep::evaluate() const {
                       pathNoise(),        m_targetReached};
   result.referenceImage = reference.pixels;
   const auto smoke = image::smokeMask(reference.pixels);
-  for (const Entry& entry : m_entries)
-    if (!entry.dropped && !entry.runs.empty()) result.points.push_back(evaluate(entry, smoke));
+  // Family by family, where the entries go level by level.
+  for (const Family& family : families())
+    for (const Entry& entry : m_entries)
+      if (entry.contender.family == &family && !entry.dropped && !entry.runs.empty())
+        result.points.push_back(evaluate(entry, smoke));
   std::error_code ignored;
   for (const Entry& entry : m_entries)
     for (const fs::path& path : entry.images)

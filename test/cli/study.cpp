@@ -123,7 +123,7 @@ TEST_F(Study, WritesPageCsvAndJson) {
 }
 
 TEST_F(Study, ThePageNeedsNothingBesideIt) {
-  ASSERT_EQ(study({"--no-hard-cases", "--no-flicker"}).exitCode, 0);
+  ASSERT_EQ(study({"--no-hard-cases", "--no-flicker", "--minutes", "0.03"}).exitCode, 0);
   const std::string html = readText(m_folder / "report/index.html");
   for (const char* outside : {"http", "<script", "<link", "@import", "<iframe", "file:"})
     EXPECT_EQ(html.find(outside), std::string::npos) << outside;
@@ -138,7 +138,8 @@ TEST_F(Study, ThePageNeedsNothingBesideIt) {
 }
 
 TEST_F(Study, ReusesTheReference) {
-  const std::vector<std::string> short_{"--no-hard-cases", "--no-flicker", "--family", "view"};
+  const std::vector<std::string> short_{"--no-hard-cases", "--no-flicker", "--family", "view",
+                                        "--minutes",       "0.03"};
   ASSERT_EQ(study(short_).exitCode, 0);
   const auto first = json().at("sweeps")[0].at("reference");
   EXPECT_EQ(first.at("samples_before"), 0);
@@ -165,7 +166,9 @@ TEST_F(Study, GoesOnWhereItWasCutOff) {
   EXPECT_FALSE(fs::exists(m_folder / "report/index.html"));
   for (const std::string& name : namesIn(m_folder / "report/cache"))
     EXPECT_EQ(name.find("runs-"), std::string::npos) << name;
-  ASSERT_EQ(study({"--no-hard-cases", "--no-flicker", "--family", "view"}).exitCode, 0);
+  ASSERT_EQ(
+      study({"--no-hard-cases", "--no-flicker", "--family", "view", "--minutes", "0.03"}).exitCode,
+      0);
   EXPECT_GT(json().at("sweeps")[0].at("reference").at("samples_before").get<int>(), 0);
 }
 
