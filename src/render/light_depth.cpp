@@ -80,6 +80,10 @@ void LightDepth::chooseLattice(const Box3d& box) {
   Box3d nodes;
   forEachCorner(box, [&](const Vec3d& p) { nodes.grow(nodePosition(p)); });
   m_first = Vec3f(glm::floor(nodes.min) - 1.0);
+  // Just inside: smoke that is cut off at its box ends there.
+  constexpr float kInset = 1e-3f;
+  m_lowest = Vec2f(nodes.min.x, nodes.min.y) + kInset;
+  m_highest = glm::max(m_lowest, Vec2f(nodes.max.x, nodes.max.y) - kInset);
   const Vec3d bricks = glm::ceil((nodes.max - Vec3d(m_first) + 1.0) / static_cast<double>(kEdge));
   if (bricks.x * bricks.y * bricks.z > kMostBricks) return;
   m_bricks = Vec3i(bricks);
@@ -135,9 +139,10 @@ void LightDepth::marchColumn(const Medium& medium, float step, std::size_t first
   const float h = 1.0f / m_nodesPerLength;
   for (int j = 0; j < kNodes; ++j)
     for (int i = 0; i < kNodes; ++i) {
-      const Vec3f inPlane =
-          m_right * ((static_cast<float>(column.x + i) + m_first.x) / m_raysPerLength) +
-          m_up * ((static_cast<float>(column.y + j) + m_first.y) / m_raysPerLength);
+      const Vec2f ray = glm::clamp(Vec2f(column.x + i, column.y + j) + Vec2f(m_first.x, m_first.y),
+                                   m_lowest, m_highest) /
+                        m_raysPerLength;
+      const Vec3f inPlane = m_right * ray.x + m_up * ray.y;
       // The place at a depth z behind the centre is linear in z.
       const Vec3f perDepth = m_axis + inPlane * m_inverseDistance;
       const Medium::AlongRay extinction(medium, m_center + inPlane, perDepth);

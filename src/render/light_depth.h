@@ -51,7 +51,9 @@ class LightDepth {
   float m_inverseDistance = 0.0f;                 // lamp to centre [1/m]; 0 = parallel rays
   float m_raysPerLength = 1.0f;                   // in the plane through the centre [1/m]
   float m_nodesPerLength = 1.0f;                  // along the axis [1/m]
-  Vec3f m_first{0.0f};                            // node coordinates of node (0,0,0)
+  // Rays of the smoke's box, in nodes of the plane: those beyond its sides stand for the side.
+  Vec2f m_lowest{0.0f}, m_highest{0.0f};
+  Vec3f m_first{0.0f};  // node coordinates of node (0,0,0)
   Vec3i m_bricks{0};
   std::vector<Vec3i> m_active;  // column by column, along the axis in each
   Field m_field;

@@ -47,10 +47,7 @@ TEST_P(BoxSingle, MatchesTheClosedForm) {
             march->radiance(Vec3d(-9, 0.1, z), Vec3f(1, 0, 0), rng, counters).single.x);
       }
       const double exact = boxSingle(sigma, 0.8, 1 - z, 2);
-      // The grid's outermost nodes lie on the cube's sharp side, where no smoke has a side.
-      const double bound = GetParam() == ShadowMode::track  ? 0.04
-                           : GetParam() == ShadowMode::grid ? 0.02
-                                                            : 0.004;
+      const double bound = GetParam() == ShadowMode::track ? 0.04 : 0.004;
       EXPECT_NEAR(sum / n, exact, bound * exact) << "sigma " << sigma << ", z " << z;
     }
   }
@@ -76,7 +73,7 @@ TEST_P(TabulatedShadow, AgreesWithAFineMarch) {
   const transport::Medium medium =
       makeMedium(sampledVolume(2.0, cells, {0.8, 0.0, 6.0}, [](const Vec3d& p) {
         const double r = glm::length(p - Vec3d(0.2, -0.1, 0.1));
-        return std::max(0.0, 1 - 1.3 * r * r) + std::max(0.0, 0.4 - 2 * glm::length(p + 0.55));
+        return std::max(0.0, 1 - 1.9 * r * r) + std::max(0.0, 0.4 - 2 * glm::length(p + 0.55));
       }));
   transport::LightList lights;
   lights.push_back(makeLight(GetParam().type, GetParam().options));
@@ -100,7 +97,7 @@ TEST_P(TabulatedShadow, AgreesWithAFineMarch) {
           shadows.transmittance(0, p, in.direction, in.distance, rng, counters));
     };
     const double t = at(table), exact = at(march);
-    ASSERT_NEAR(t, exact, 0.03) << p.x << " " << p.y << " " << p.z;
+    ASSERT_NEAR(t, exact, 0.05) << p.x << " " << p.y << " " << p.z;
     squares += (t - exact) * (t - exact);
     difference += t - exact;
     sum += exact;
@@ -117,7 +114,7 @@ INSTANTIATE_TEST_SUITE_P(
                     LampCase{"lamp_beside", "point", {{"position", "[0.3, 1.9, -0.4]"}}},
                     LampCase{"spot", "spot", {{"position", "[-3, 2, 2]"}, {"cone_angle", "60"}}},
                     LampCase{"lamp_inside", "point", {{"position", "[0.2, 0.1, 0.3]"}}}),
-    [](const auto& info) { return std::string(info.param.name); });
+    [](const auto& lamp) { return std::string(lamp.param.name); });
 
 // What lies beyond the budget is marched: the same light, no memory.
 TEST(Shadows, GridPastTheBudgetIsMarched) {
