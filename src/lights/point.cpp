@@ -25,8 +25,7 @@ class PointLight final : public Light {
   }
 
   Illumination illuminate(const Vec3f& point, const Vec2f&) const override {
-    Vec3d direction;
-    return m_source.illuminate(point, direction);
+    return m_source.illuminate(point);
   }
 
   bool isDelta() const override { return true; }

@@ -79,7 +79,20 @@ class PointSource {
   /// I / d^2. The square grows no more once d falls below the rounding of a float position there
   /// (1e-7 of its length, at least 1e-9 m); at the source itself no direction is known and the
   /// irradiance is 0.
-  /// @param[out] direction  the unit propagation direction in double
+  Illumination illuminate(const Vec3f& point) const {
+    // The difference in double, where it cancels; its length in float, where that has no digits to
+    // lose.
+    const Vec3f d(Vec3d(point) - m_position);
+    const float squared = glm::dot(d, d);
+    if (!(squared > 1e-30f && squared < 1e30f)) {
+      Vec3d direction;
+      return illuminate(point, direction);
+    }
+    const float inverse = 1.0f / std::sqrt(squared);
+    const float clamped = glm::min(inverse, static_cast<float>(m_largestInverse));
+    return {d * inverse, squared * inverse, m_intensity * (clamped * clamped)};
+  }
+  /// The same, and the unit propagation direction in double.
   Illumination illuminate(const Vec3f& point, Vec3d& direction) const {
     const Vec3d d = Vec3d(point) - m_position;
     const double squared = glm::dot(d, d);
