@@ -40,7 +40,7 @@ struct FrameStatistics {
   Vec3d energyEmitted{0.0}, energyMissed{0.0}, energyAbsorbed{0.0}, energyEscaped{0.0},
       energyCapped{0.0}, energyError{0.0};
   std::uint64_t nanSamples = 0, negativeSamples = 0, majorantViolations = 0;
-  double clampedLight = 0;  ///< InscatterSource::clampedShare
+  double clampedLight = 0;         ///< InscatterSource::clampedShare
   std::uint64_t pathsCapped = 0;   ///< path_traced: ended by max_scatter
   double pathsCappedRadiance = 0;  ///< throughput they still carried, summed
   std::vector<EffectState> effects;

@@ -15,10 +15,10 @@ namespace photosphere::sphere {
 enum class Reconstruction {
   constant,  ///< as it was collected: evenly over the cell for `nearest`, so that the phase
              ///< function is averaged over the bin, by its share elsewhere
-  smooth,  ///< as a smooth function over the sphere that would leave this histogram: removes
-           ///< most of the error that wide bins make where phase and light peak together; weights
-           ///< may be slightly negative. Above 512 bins light is taken as even over every cell,
-           ///< which is as good there
+  smooth,    ///< as a smooth function over the sphere that would leave this histogram: removes
+             ///< most of the error that wide bins make where phase and light peak together; weights
+             ///< may be slightly negative. Above 512 bins light is taken as even over every cell,
+             ///< which is as good there
 };
 
 /// Table of W_j(wo) = integral of f(w, wo) b_j(w) dw [1/sr], the phase function averaged over the

@@ -17,8 +17,8 @@ struct OpticalDepth {
 /// Median optical depth at which smoke looks like smoke: it blocks 99 % of the light and still lets
 /// it scatter many times.
 inline constexpr double kSmokeDepth = 5;
-/// Rays thinner than this part of the thickest meet no smoke: solvers leave traces of 1e-30 all over
-/// their domain, and columns of stray voxels would drag the median down.
+/// Rays thinner than this part of the thickest meet no smoke: solvers leave traces of 1e-30 all
+/// over their domain, and columns of stray voxels would drag the median down.
 inline constexpr double kTraceDepth = 0.01;
 /// `value` to two significant digits, as suggestions are given.
 double roundedToTwoDigits(double value);
