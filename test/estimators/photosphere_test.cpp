@@ -90,10 +90,13 @@ TEST_P(Agreement, WithPathTracing) {
       multiple.relMseSmoke, multiple.referenceNoise);
   EXPECT_EQ(frame.layers.nanSamples + frame.layers.negativeSamples, 0u);
   if (kSanitized) return;  // too few paths to judge by
+  // Over the seeds 1 to 4, 6 and 7, 2026-11-22 (PHOTOSPHERE_TEST_SEED): voxels within 0.0074 in the
+  // mean, relMSE at most 0.0032 (multiple 0.0082); particles within 0.0249, 0.0034 (0.0104). The
+  // errors' bounds are twice that.
   const bool voxels = c.carrier == Carrier::voxels;
   EXPECT_NEAR(total.meanRatio, 1.0, voxels ? 0.01 : 0.03);
-  EXPECT_LT(total.relMse, voxels ? 0.03 : 0.05);
-  EXPECT_LT(multiple.relMse, voxels ? 0.03 : 0.06);
+  EXPECT_LT(total.relMse, 0.007);
+  EXPECT_LT(multiple.relMse, voxels ? 0.017 : 0.021);
 }
 
 INSTANTIATE_TEST_SUITE_P(
