@@ -46,6 +46,8 @@ TEST(Emission, EvenBoxMatchesTheClosedForm) {
     EXPECT_NEAR(static_cast<double>(r.emission.y), exact * 2 / 7, 2e-5 * exact) << sigma;
     EXPECT_EQ(r.emission.z, 0.0f);
     EXPECT_EQ(maxComponent(r.single + r.multiple + r.background), 0.0f);
+    // Too few paths meet a collision there to know their spread.
+    if (kSanitized && sigma == 1e-4) continue;
     const Estimate e = estimate(*path, Vec3d(d) * -5.0, d, 40'000, [](const RayRadiance& p) {
       return static_cast<double>(p.emission.x);
     });
