@@ -75,6 +75,10 @@ void readDamaged(const fs::path& path, const std::string& what, Outcome& outcome
   }
   int status = 0;
   waitpid(child, &status, 0);
+  if (test::kSanitized && WIFSIGNALED(status) && WTERMSIG(status) == SIGXCPU) {
+    ++outcome.refused;  // OpenVDB fills memory that the limit, absent here, would have refused
+    return;
+  }
   ASSERT_TRUE(WIFEXITED(status)) << what << ": signal " << WTERMSIG(status);
   int code = WEXITSTATUS(status);
   if (code == test::kSanitizerExit) {
