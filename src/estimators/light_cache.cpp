@@ -8,6 +8,7 @@
 
 #include "photosphere/core/error.h"
 #include "photosphere/core/version.h"
+#include "photosphere/estimators/layout_names.h"
 #include "photosphere/sphere/spherical_harmonics.h"
 #include "photosphere/volume/vdb_file.h"
 
@@ -19,43 +20,6 @@ using Metadata = std::map<std::string, std::string>;
 
 constexpr const char* kGridName = "light";
 constexpr const char* kFormat = "photosphere light cache 1";
-
-// Names of enumerators as scene files have them.
-template <class E>
-struct Named {
-  E value;
-  const char* name;
-};
-constexpr Named<Carrier> kCarriers[] = {{Carrier::voxels, "voxels"},
-                                        {Carrier::particles, "particles"}};
-// The view basis belongs to one camera and has no cache.
-constexpr Named<Basis> kBases[] = {{Basis::histogram, "histogram"},
-                                   {Basis::sphericalHarmonics, "spherical_harmonics"}};
-constexpr Named<Deposit> kDeposits[] = {{Deposit::trackLength, "track_length"},
-                                        {Deposit::collision, "collision"}};
-constexpr Named<EnergyRule> kEnergies[] = {{EnergyRule::gather, "gather"},
-                                           {EnergyRule::scatter, "scatter"}};
-constexpr Named<SpatialKernel> kKernels[] = {{SpatialKernel::epanechnikov, "epanechnikov"},
-                                             {SpatialKernel::box, "box"},
-                                             {SpatialKernel::gaussian, "gaussian"}};
-
-constexpr Named<sphere::DirectionDeposit> kDirections[] = {
-    {sphere::DirectionDeposit::nearest, "nearest"},
-    {sphere::DirectionDeposit::barycentric, "barycentric"},
-    {sphere::DirectionDeposit::kernel, "kernel"}};
-constexpr Named<Representative> kRepresentatives[] = {{Representative::bin, "bin"},
-                                                      {Representative::mean, "mean"}};
-constexpr Named<sphere::AngularKernel> kAngularKernels[] = {
-    {sphere::AngularKernel::none, "none"},
-    {sphere::AngularKernel::epanechnikov, "epanechnikov"},
-    {sphere::AngularKernel::gaussian, "gaussian"}};
-
-template <class E, std::size_t N>
-const char* nameOf(const Named<E> (&table)[N], E value) {
-  for (const auto& row : table)
-    if (row.value == value) return row.name;
-  return "";
-}
 
 // Numbers as text that reads back to the same bits.
 std::string exact(double v) {
@@ -100,10 +64,9 @@ class Reader {
     if (!(v >= low && v <= high) || v != std::floor(v)) bad(key);
     return static_cast<int>(v);
   }
-  template <class E, std::size_t N>
-  E choice(const std::string& key, const Named<E> (&table)[N]) const {
-    for (const auto& row : table)
-      if (text(key) == row.name) return row.value;
+  template <class E>
+  E choice(const std::string& key) const {
+    if (const std::optional<E> value = named<E>(text(key))) return *value;
     bad(key);
   }
   [[noreturn]] void bad(const std::string& key) const {
@@ -124,17 +87,17 @@ Metadata describe(const LightField& field, const LightCacheKey& key) {
   m["photosphere_format"] = kFormat;
   m["photosphere_version"] = versionText();
   m["quantity"] = l.holdsPower() ? "power [W]" : "fluence rate [W m^-2]";
-  m["carrier"] = nameOf(kCarriers, l.carrier);
-  m["basis"] = nameOf(kBases, l.basis);
+  m["carrier"] = nameOf(l.carrier);
+  m["basis"] = nameOf(l.basis);
   if (l.basis == Basis::sphericalHarmonics) m["order"] = std::to_string(l.order);
-  m["deposit"] = nameOf(kDeposits, l.deposit);
-  m["energy"] = nameOf(kEnergies, l.energy);
-  m["spatial_kernel"] = nameOf(kKernels, l.kernel);
+  m["deposit"] = nameOf(l.deposit);
+  m["energy"] = nameOf(l.energy);
+  m["spatial_kernel"] = nameOf(l.kernel);
   m["rows"] = std::to_string(l.rows);
-  m["direction"] = nameOf(kDirections, l.direction);
-  m["representative"] = nameOf(kRepresentatives, l.representative);
+  m["direction"] = nameOf(l.direction);
+  m["representative"] = nameOf(l.representative);
   if (l.direction == sphere::DirectionDeposit::kernel) {
-    m["kernel"] = nameOf(kAngularKernels, l.angularKernel);
+    m["kernel"] = nameOf(l.angularKernel);
     m["bandwidth"] = exact(l.bandwidth);
     m["truncation"] = exact(l.truncation);
   }
@@ -264,19 +227,20 @@ LightField readLightCache(const std::filesystem::path& path, const LightCacheKey
 
   LightField field;
   LightFieldLayout& l = field.layout;
-  l.carrier = m.choice("carrier", kCarriers);
-  l.basis = m.choice("basis", kBases);
+  l.carrier = m.choice<Carrier>("carrier");
+  l.basis = m.choice<Basis>("basis");
+  if (l.basis == Basis::view) m.bad("basis");  // belongs to one camera and has no cache
   if (l.basis == Basis::sphericalHarmonics)
     l.order = m.whole("order", 0, sphere::SphericalHarmonics::kMaxOrder);
-  l.deposit = m.choice("deposit", kDeposits);
-  l.energy = m.choice("energy", kEnergies);
-  l.kernel = m.choice("spatial_kernel", kKernels);
+  l.deposit = m.choice<Deposit>("deposit");
+  l.energy = m.choice<EnergyRule>("energy");
+  l.kernel = m.choice<SpatialKernel>("spatial_kernel");
   l.rows = m.whole("rows", 1, 64);
   // Caches written before these choices existed hold their defaults.
-  if (m.has("direction")) l.direction = m.choice("direction", kDirections);
-  if (m.has("representative")) l.representative = m.choice("representative", kRepresentatives);
+  if (m.has("direction")) l.direction = m.choice<sphere::DirectionDeposit>("direction");
+  if (m.has("representative")) l.representative = m.choice<Representative>("representative");
   if (l.direction == sphere::DirectionDeposit::kernel) {
-    l.angularKernel = m.choice("kernel", kAngularKernels);
+    l.angularKernel = m.choice<sphere::AngularKernel>("kernel");
     l.bandwidth = m.number("bandwidth");
     l.truncation = m.number("truncation");
     if (!(l.bandwidth >= 1e-4 && l.bandwidth <= 1e4)) m.bad("bandwidth");

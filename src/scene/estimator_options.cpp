@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "photosphere/core/error.h"
+#include "photosphere/estimators/layout_names.h"
 
 namespace photosphere::scene {
 
@@ -28,14 +29,10 @@ constexpr Preset kPresets[] = {
     {"paper", "the settings of Min & Ihm 2010, errata corrected", kPaper},
 };
 
-// An option and the key it is read from.
+// The rows of [estimator] admit no other names.
 template <class E>
-E choice(const ParamValues& values, std::string_view key,
-         std::initializer_list<std::pair<std::string_view, E>> names) {
-  const std::string& text = values.text(key);
-  for (const auto& [name, value] : names)
-    if (text == name) return value;
-  return names.begin()->second;
+E choice(const ParamValues& values, std::string_view key) {
+  return named<E>(values.text(key)).value();
 }
 
 }  // namespace
@@ -61,31 +58,15 @@ void applyPreset(ParamValues& estimator, const std::string& place) {
 
 LightFieldLayout layoutOf(const ParamValues& e, bool lightCache) {
   LightFieldLayout l;
-  l.carrier = choice<Carrier>(e, "carrier",
-                              {{"voxels", Carrier::voxels}, {"particles", Carrier::particles}});
-  l.deposit = choice<Deposit>(
-      e, "deposit", {{"track_length", Deposit::trackLength}, {"collision", Deposit::collision}});
-  l.energy = choice<EnergyRule>(e, "energy",
-                                {{"gather", EnergyRule::gather}, {"scatter", EnergyRule::scatter}});
-  l.kernel = choice<SpatialKernel>(e, "spatial_kernel",
-                                   {{"epanechnikov", SpatialKernel::epanechnikov},
-                                    {"box", SpatialKernel::box},
-                                    {"gaussian", SpatialKernel::gaussian}});
-  using sphere::DirectionDeposit;
-  l.direction = choice<DirectionDeposit>(e, "direction",
-                                         {{"nearest", DirectionDeposit::nearest},
-                                          {"barycentric", DirectionDeposit::barycentric},
-                                          {"kernel", DirectionDeposit::kernel}});
-  l.representative = choice<Representative>(
-      e, "representative", {{"bin", Representative::bin}, {"mean", Representative::mean}});
-  l.merge = choice<Merge>(e, "merge", {{"full", Merge::full}, {"sampled", Merge::sampled}});
-  l.evaluate = choice<Evaluate>(e, "evaluate",
-                                {{"per_view", Evaluate::perView}, {"per_step", Evaluate::perStep}});
-  using sphere::AngularKernel;
-  l.angularKernel = choice<AngularKernel>(e, "kernel",
-                                          {{"none", AngularKernel::none},
-                                           {"epanechnikov", AngularKernel::epanechnikov},
-                                           {"gaussian", AngularKernel::gaussian}});
+  l.carrier = choice<Carrier>(e, "carrier");
+  l.deposit = choice<Deposit>(e, "deposit");
+  l.energy = choice<EnergyRule>(e, "energy");
+  l.kernel = choice<SpatialKernel>(e, "spatial_kernel");
+  l.direction = choice<sphere::DirectionDeposit>(e, "direction");
+  l.representative = choice<Representative>(e, "representative");
+  l.merge = choice<Merge>(e, "merge");
+  l.evaluate = choice<Evaluate>(e, "evaluate");
+  l.angularKernel = choice<sphere::AngularKernel>(e, "kernel");
   l.bandwidth = e.real("bandwidth");
   l.truncation = e.real("truncation");
   l.directions = static_cast<int>(e.integer("directions"));
@@ -94,13 +75,12 @@ LightFieldLayout layoutOf(const ParamValues& e, bool lightCache) {
   // Rays after the first bounce come from everywhere.
   if (e.integer("final_gather") > 0) l.evaluate = Evaluate::perStep;
   l.lightVoxel = e.real("light_voxel");
-  const bool ofBins = l.direction != DirectionDeposit::nearest ||
+  const bool ofBins = l.direction != sphere::DirectionDeposit::nearest ||
                       l.representative != Representative::bin || l.merge != Merge::full ||
-                      l.evaluate != Evaluate::perView || l.angularKernel != AngularKernel::none;
-  const std::string& basis = e.text("basis");
-  l.basis = basis == "spherical_harmonics" ? Basis::sphericalHarmonics
-            : basis == "view" || (basis == "auto" && !lightCache && !ofBins) ? Basis::view
-                                                                             : Basis::histogram;
+                      l.evaluate != Evaluate::perView ||
+                      l.angularKernel != sphere::AngularKernel::none;
+  const Basis automatic = lightCache || ofBins ? Basis::histogram : Basis::view;
+  l.basis = named<Basis>(e.text("basis")).value_or(automatic);
   return l;
 }
 
@@ -151,25 +131,23 @@ void checkEstimator(const ParamValues& e, const std::string& place) {
 }
 
 std::string describeLayout(const LightFieldLayout& l) {
-  std::string text = fmt::format(
-      "{}, {}, {}, {} channel{}{}", l.carrier == Carrier::particles ? "particles" : "voxels",
+  const std::string basis =
       l.basis == Basis::view ? "view"
       : l.basis == Basis::sphericalHarmonics
           ? fmt::format("{} spherical harmonics (order {})", l.bins(), l.order)
-          : fmt::format("histogram of {} bins ({} rows)", l.bins(), l.rows),
-      l.deposit == Deposit::collision ? "collision" : "track_length", l.channels,
-      l.channels == 1 ? "" : "s",
-      l.holdsPower() ? (l.energy == EnergyRule::scatter ? ", scatter" : ", gather") : "");
-  if (l.direction == sphere::DirectionDeposit::barycentric) text += ", direction barycentric";
-  if (l.direction == sphere::DirectionDeposit::kernel) text += ", direction kernel";
-  if (l.representative == Representative::mean) text += ", representative mean";
-  if (l.merge == Merge::sampled) text += ", merge sampled";
-  if (l.evaluate == Evaluate::perStep) text += ", evaluate per_step";
+          : fmt::format("histogram of {} bins ({} rows)", l.bins(), l.rows);
+  std::string text = fmt::format("{}, {}, {}, {} channel{}", nameOf(l.carrier), basis,
+                                 nameOf(l.deposit), l.channels, l.channels == 1 ? "" : "s");
+  if (l.holdsPower()) text += fmt::format(", {}", nameOf(l.energy));
+  if (l.direction != sphere::DirectionDeposit::nearest)
+    text += fmt::format(", direction {}", nameOf(l.direction));
+  if (l.representative != Representative::bin)
+    text += fmt::format(", representative {}", nameOf(l.representative));
+  if (l.merge != Merge::full) text += fmt::format(", merge {}", nameOf(l.merge));
+  if (l.evaluate != Evaluate::perView) text += fmt::format(", evaluate {}", nameOf(l.evaluate));
   if (l.angularKernel != sphere::AngularKernel::none)
-    text += fmt::format(
-        ", kernel {} of bandwidth {} cut at {}",
-        l.angularKernel == sphere::AngularKernel::gaussian ? "gaussian" : "epanechnikov",
-        l.bandwidth, l.truncation);
+    text += fmt::format(", kernel {} of bandwidth {} cut at {}", nameOf(l.angularKernel),
+                        l.bandwidth, l.truncation);
   if (l.merge == Merge::sampled && l.evaluate == Evaluate::perStep)
     text += fmt::format(", {} restored directions", l.directions);
   return text;
