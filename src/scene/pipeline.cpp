@@ -5,31 +5,15 @@
 #include <algorithm>
 #include <cmath>
 
-#include "estimator_options.h"
+#include "frame_batches.h"
 #include "light_stage.h"
-#include "photon_map_stage.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/frames.h"
-#include "photosphere/core/log.h"
 #include "photosphere/core/resources.h"
-#include "photosphere/render/integrator.h"
-#include "photosphere/render/shadows.h"
 
 namespace photosphere::scene {
 
 namespace {
-
-render::ShadowMode shadowMode(const std::string& name) {
-  if (name == "march") return render::ShadowMode::march;
-  if (name == "track") return render::ShadowMode::track;
-  return render::ShadowMode::grid;
-}
-
-render::FilterKind filterKind(const std::string& name) {
-  if (name == "box") return render::FilterKind::box;
-  if (name == "triangle") return render::FilterKind::triangle;
-  return render::FilterKind::blackmanHarris;
-}
 
 render::Crop clippedCrop(const std::optional<render::Crop>& wished, const Vec2i& resolution) {
   if (!wished) return {Vec2i(0), resolution};
@@ -38,17 +22,6 @@ render::Crop clippedCrop(const std::optional<render::Crop>& wished, const Vec2i&
     throw ConfigError(fmt::format("the crop lies outside the frame of {} x {} pixels", resolution.x,
                                   resolution.y));
   return crop;
-}
-
-// What a path tracer or a light cache holds although the scene switched it off.
-void dropLayers(const Effects& effects, render::FrameLayers& layers) {
-  if (effects.singleScattering && effects.multipleScattering) return;
-  for (std::size_t i = 0; i < layers.beauty.size(); ++i) {
-    if (!effects.singleScattering) layers.single[i] = Rgb(0.0f);
-    if (!effects.multipleScattering) layers.multiple[i] = Rgb(0.0f);
-    layers.beauty[i] =
-        layers.single[i] + layers.multiple[i] + layers.emission[i] + layers.background[i];
-  }
 }
 
 void checkSamples(const render::FrameLayers& layers) {
@@ -83,237 +56,6 @@ std::vector<std::string> presentLayers(const FrameSetup& setup) {
   names.emplace_back("depth");
   return names;
 }
-
-// A basis that can go negative is clamped where it is read.
-void noteClamped(double share, FrameSetup& setup, FrameStatistics& statistics) {
-  statistics.clampedLight = share;
-  if (!(share > 0.001)) return;
-  setup.notes.push_back(fmt::format(
-      "{:.2g} of the stored light is below zero toward where it is read and counts as 0, a bias of "
-      "the basis beside sharp peaks; raise estimator.{}",
-      share,
-      setup.layout.basis == estimators::Basis::sphericalHarmonics
-          ? "order, or smooth with estimator.kernel"
-          : "rows"));
-}
-
-std::string describe(const estimators::PhotonMapLayout& map) {
-  return fmt::format("photon map, {} channel{}, {}{}", map.channels, map.channels == 1 ? "" : "s",
-                     map.neighbors > 0 ? fmt::format("{} nearest", map.neighbors) : "all in reach",
-                     map.passes > 1 ? fmt::format(", {} passes", map.passes) : "");
-}
-
-using Source = std::unique_ptr<estimators::InscatterSource>;
-
-// The light of one pass of a frame, ready to be looked up; null where nothing asks for it.
-struct PassLight {
-  Source source;
-  Source wider;  // the same photons through a wider kernel, where that is asked for
-};
-
-// How much wider.
-constexpr double kWidening = 1.5;
-
-Source widened(const FrameSetup& setup, estimators::LightField field) {
-  // A kernel narrower than a light voxel does nothing: the voxel itself is the width there.
-  const double edge = field.layout.lightVoxel * setup.medium->voxelEdge();
-  field.layout.radius = kWidening * std::max(field.layout.radius, edge);
-  return estimators::resolve(*setup.medium, std::move(field), setup.view, setup.key);
-}
-
-PassLight prepareLight(const SceneFile& scene, const RenderRequest& request, int pass, bool wider,
-                       FrameSetup& setup, FrameResult& result) {
-  PassLight light;
-  if (!storesLight(scene, setup)) return light;
-  if (setup.photonMap) {
-    result.layout = describe(*setup.photonMap);
-    result.radius = setup.photonMap->radius / setup.space.metersPerUnit;
-    light.source = photonMapPass(setup, pass, 1.0, result.statistics);
-    FrameStatistics again;
-    if (wider) light.wider = photonMapPass(setup, pass, kWidening, again);
-    return light;
-  }
-  estimators::LightField field = lightField(scene, request, setup, result.statistics);
-  result.layout = describeLayout(setup.layout);
-  result.radius = setup.layout.radius / setup.space.metersPerUnit;
-  const Stopwatch watch;
-  if (wider) light.wider = widened(setup, field);
-  auto source = estimators::resolve(*setup.medium, std::move(field), setup.view, setup.key);
-  result.statistics.seconds.resolve += watch.seconds();
-  noteClamped(source->clampedShare(), setup, result.statistics);
-  light.source = std::move(source);
-  return light;
-}
-
-std::uint64_t shadowBudget(const FrameSetup& setup) {
-  if (setup.memoryBudget == 0) return 0;
-  const std::uint64_t used = setup.medium->memoryBytes();
-  return setup.memoryBudget > used ? setup.memoryBudget - used : 1;
-}
-
-render::FrameOptions frameOptions(const SceneFile& scene, const RenderRequest& request,
-                                  const FrameSetup& setup, bool paths) {
-  render::FrameOptions options;
-  const auto samples = static_cast<int>(paths ? scene.estimator.integer("samples")
-                                              : scene.render.integer("samples"));
-  options.samples = (samples + setup.batches - 1) / setup.batches;
-  options.filter = filterKind(scene.render.text("filter"));
-  options.filterWidth = scene.render.real("filter_width");
-  options.crop = clippedCrop(request.crop, setup.camera->resolution());
-  options.space = setup.space;
-  return options;
-}
-
-// Rays through the smoke, for one pass of a frame or several.
-class LayerRenderer {
- public:
-  LayerRenderer(const SceneFile& scene, const RenderRequest& request, const FrameSetup& setup)
-      : m_setup(setup),
-        m_paths(scene.estimator.text("type") == "path_traced"),
-        m_options(frameOptions(scene, request, setup, m_paths)) {
-    m_path.maxScatter = static_cast<int>(scene.estimator.integer("max_scatter"));
-    m_path.effects = m_march.effects = setup.effects;
-    m_march.step = static_cast<float>(scene.render.real("step"));
-    if (m_paths) return;
-    if (storesLight(scene, setup))
-      m_march.gatherRays = static_cast<int>(
-          (scene.estimator.integer("final_gather") + m_options.samples - 1) / m_options.samples);
-    const bool shadowed = setup.effects.singleScattering && setup.effects.shadows;
-    const auto mode = shadowed || m_march.gatherRays > 0
-                          ? shadowMode(scene.render.text("shadow"))
-                          : render::ShadowMode::march;  // tabulates nothing
-    m_shadows.emplace(*setup.medium, setup.lights, mode,
-                      m_march.step * static_cast<float>(setup.medium->voxelEdge()),
-                      shadowBudget(setup));
-  }
-
-  /// @param source  the estimator's answer; may be null
-  render::FrameLayers render(const estimators::InscatterSource* source, int pass) const {
-    render::FrameOptions options = m_options;
-    options.key = m_setup.key;
-    options.firstSample = pass * options.samples;
-    const auto integrator =
-        m_paths ? render::makePathIntegrator(*m_setup.medium, m_setup.lights, m_path)
-                : render::makeMarchIntegrator(*m_setup.medium, m_setup.lights, *m_shadows, source,
-                                              m_march);
-    render::FrameLayers layers = render::renderFrame(*m_setup.camera, *integrator, options);
-    dropLayers(m_setup.effects, layers);
-    return layers;
-  }
-
- private:
-  const FrameSetup& m_setup;
-  bool m_paths;
-  render::FrameOptions m_options;
-  render::PathOptions m_path;
-  render::MarchOptions m_march;
-  std::optional<render::Shadows> m_shadows;
-};
-
-int cropWidth(const RenderRequest& request, const FrameSetup& setup) {
-  const render::Crop crop = clippedCrop(request.crop, setup.camera->resolution());
-  return crop.max.x - crop.min.x;
-}
-
-// The frame in independent batches, each of photons, samples and random numbers of its own, until
-// its error or the time is what was asked for.
-class FrameLoop {
- public:
-  FrameLoop(const SceneFile& scene, const RenderRequest& request, FrameSetup& setup,
-            const Stopwatch& watch, FrameResult& result)
-      : m_scene(scene),
-        m_request(request),
-        m_setup(setup),
-        m_watch(watch),
-        m_result(result),
-        m_target(scene.render.real("target_error")),
-        m_timeLimit(scene.render.real("time_limit")),
-        m_passes(setup.photonMap ? setup.photonMap->passes : 1),
-        m_error(cropWidth(request, setup)) {}
-
-  void run() {
-    const RandomKey key = m_setup.key;
-    const auto seed = static_cast<std::uint64_t>(key.hi) << 32 | key.lo;
-    std::size_t notes = 0;
-    int batch = 0;
-    do {
-      if (batch > 0) m_setup.key = RandomKey::fromSeed(seed, batch);
-      renderBatch();
-      // What a batch has to say it says once.
-      if (batch == 0) notes = m_setup.notes.size();
-      m_setup.notes.resize(notes);
-    } while (!done(++batch));
-    m_setup.key = key;
-    if (!once()) m_result.layers = m_mean.mean();
-    m_result.statistics.batches = batch;
-    if (m_setup.batches > 1) reportError(batch);
-  }
-
- private:
-  // One batch: all passes of a progressive photon map, one of everything else.
-  void renderBatch() {
-    const bool judged = m_setup.batches > 1;
-    const bool wider = m_target > 0 && m_error.batches() < m_setup.batches;
-    for (int pass = 0; pass < m_passes; ++pass) {
-      const PassLight light = prepareLight(m_scene, m_request, pass, wider, m_setup, m_result);
-      const Stopwatch watch;
-      if (!m_renderer) m_renderer.emplace(m_scene, m_request, m_setup);
-      render::FrameLayers layers = m_renderer->render(light.source.get(), pass);
-      if (!once()) m_mean.add(layers);
-      if (light.wider)
-        m_error.add(layers.beauty, m_renderer->render(light.wider.get(), pass).beauty, kWidening);
-      else if (judged)
-        m_error.add(layers.beauty);
-      if (once()) m_result.layers = std::move(layers);
-      m_result.statistics.seconds.march += watch.seconds();
-    }
-  }
-
-  bool once() const { return m_setup.batches == 1 && m_passes == 1; }
-
-  bool done(int batches) {
-    if (m_timeLimit > 0 && m_watch.seconds() > m_timeLimit) return true;
-    if (batches < m_setup.batches) return false;
-    if (!(m_target > 0)) return true;
-    const ErrorEstimate e = m_error.estimate();
-    // Photons do not mend a bias.
-    return e.total() <= m_target || (e.bias >= m_target && e.noise < 0.5 * e.bias);
-  }
-
-  void reportError(int batches) {
-    FrameStatistics& s = m_result.statistics;
-    // Every batch traced all the light there is.
-    for (Vec3d* power : {&s.energyEmitted, &s.energyMissed, &s.energyAbsorbed, &s.energyEscaped,
-                         &s.energyCapped, &s.energyError})
-      *power /= static_cast<double>(batches);
-    if (batches < 2) {
-      s.targetMissed = m_target > 0;
-      return;
-    }
-    s.error = m_error.estimate();
-    s.targetMissed = m_target > 0 && (batches < m_setup.batches || s.error->total() > m_target);
-    m_result.error = m_error.standardError();
-    m_result.layerNames.emplace_back("error");
-    if (!s.targetMissed) return;
-    m_setup.notes.push_back(
-        fmt::format("the estimated error {:.4g} (noise {:.4g}, bias {:.4g}) misses "
-                    "render.target_error {:.4g}: {}",
-                    s.error->total(), s.error->noise, s.error->bias, m_target,
-                    s.error->bias >= m_target ? "lower estimator.radius or light_voxel"
-                                              : "raise render.time_limit"));
-  }
-
-  const SceneFile& m_scene;
-  const RenderRequest& m_request;
-  FrameSetup& m_setup;
-  const Stopwatch& m_watch;
-  FrameResult& m_result;
-  double m_target, m_timeLimit;
-  int m_passes;
-  std::optional<LayerRenderer> m_renderer;
-  render::FrameMean m_mean;
-  FrameError m_error;
-};
 
 void finish(const FrameSetup& setup, double cpuBefore, FrameResult& result) {
   FrameStatistics& s = result.statistics;
@@ -358,7 +100,7 @@ FrameResult renderScene(const SceneFile& scene, std::int64_t frame, const Render
   const Stopwatch total;
   const double cpuBefore = processCpuSeconds();
   FrameSetup setup = setUpFrame(scene, frame, setupOptions(request));
-  clippedCrop(request.crop, setup.camera->resolution());  // a wrong crop fails before the work
+  const render::Crop crop = clippedCrop(request.crop, setup.camera->resolution());
   FrameResult result;
   result.frame = frame;
   startStatistics(scene, setup, result.statistics);
@@ -370,7 +112,7 @@ FrameResult renderScene(const SceneFile& scene, std::int64_t frame, const Render
   result.seed = request.seed.value_or(scene.scene.integer("seed"));
 
   checkMemory(setup, storesLight(scene, setup) && scene.estimator.text("cache").empty());
-  FrameLoop(scene, request, setup, total, result).run();
+  renderBatches(scene, request, crop, total, setup, result);
   result.notes = setup.notes;
   finish(setup, cpuBefore, result);
   checkSamples(result.layers);
