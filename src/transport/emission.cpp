@@ -16,13 +16,13 @@ float share(int i) {
   return i == 0 || i == kNodes - 1 ? 0.5f : 1.0f;
 }
 
-// Calls visit(node, weight) for the nodes of a brick in storage order.
+// Calls visit(node, weight) for the nodes of a brick in storage order, until it returns false.
 template <class Visit>
 void forEachNode(const Visit& visit) {
   for (int z = 0; z < kNodes; ++z)
     for (int y = 0; y < kNodes; ++y)
       for (int x = 0; x < kNodes; ++x)
-        visit(Vec3i(x, y, z), share(x) * share(y) * share(z));
+        if (!visit(Vec3i(x, y, z), share(x) * share(y) * share(z))) return;
 }
 
 // Draws from a node's hat, 1 - |x| on [-1, 1], cut at the brick's faces.
@@ -57,6 +57,7 @@ Emission::Emission(const std::vector<const VolumeEmission*>& volumes) {
           forEachNode([&](const Vec3i&, float weight) {
             m_grey = m_grey && node->x == node->y && node->y == node->z;
             sum += glm::dvec4(*node++ * weight);
+            return true;
           });
           m_power += watts * Vec3d(sum);
           m_birthPower += watts * sum.w;
@@ -92,12 +93,13 @@ Emission::Birth Emission::birth(double u, const Vec3f& offset) const {
   const Vec4f* at = nodes;
   forEachNode([&](const Vec3i& candidate, float weight) {
     const float own = weight * at->w;
-    if (left >= 0.0f && own > 0.0f) {
+    if (own > 0.0f) {
       node = candidate;
       value = *at;
       left -= own;
     }
     ++at;
+    return !(own > 0.0f) || left >= 0.0f;
   });
   Birth birth;
   const Vec3f within(hat(node.x, offset.x), hat(node.y, offset.y), hat(node.z, offset.z));
