@@ -83,7 +83,15 @@ void addCrossovers(const Curve& a, const Curve& b, std::vector<Crossover>& out) 
   }
 }
 
-std::vector<double> roundNumbers(double low, double high) {
+// Round numbers within the range of one coordinate of all points.
+std::vector<double> roundNumbersAround(const std::vector<Curve>& curves,
+                                       double CurvePoint::*coordinate) {
+  double low = 1e300, high = 0;
+  for (const Curve& curve : curves)
+    for (const CurvePoint& p : curve.points) {
+      low = std::min(low, p.*coordinate);
+      high = std::max(high, p.*coordinate);
+    }
   std::vector<double> numbers;
   for (int decade = -9; decade <= 9; ++decade)
     for (const double digit : {1.0, 2.0, 5.0}) {
@@ -148,23 +156,11 @@ std::vector<Crossover> crossovers(const std::vector<Curve>& curves) {
 }
 
 std::vector<double> roundTimes(const std::vector<Curve>& curves) {
-  double low = 1e300, high = 0;
-  for (const Curve& curve : curves)
-    for (const CurvePoint& p : curve.points) {
-      low = std::min(low, p.seconds);
-      high = std::max(high, p.seconds);
-    }
-  return roundNumbers(low, high);
+  return roundNumbersAround(curves, &CurvePoint::seconds);
 }
 
 std::vector<double> roundErrors(const std::vector<Curve>& curves) {
-  double low = 1e300, high = 0;
-  for (const Curve& curve : curves)
-    for (const CurvePoint& p : curve.points) {
-      low = std::min(low, p.error);
-      high = std::max(high, p.error);
-    }
-  std::vector<double> errors = roundNumbers(low, high);
+  std::vector<double> errors = roundNumbersAround(curves, &CurvePoint::error);
   std::reverse(errors.begin(), errors.end());
   return errors;
 }

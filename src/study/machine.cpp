@@ -6,10 +6,14 @@
 #include <fstream>
 
 #include "photosphere/core/error.h"
+#include "photosphere/core/version.h"
+#include "photosphere/image/exr_attributes.h"
 
 namespace photosphere::study {
 
 namespace fs = std::filesystem;
+
+namespace {
 
 std::string machineName() {
   std::ifstream info("/proc/cpuinfo");
@@ -22,6 +26,16 @@ std::string machineName() {
   utsname system = {};
   uname(&system);
   return fmt::format("{}, {} {}", model, system.sysname, system.release);
+}
+
+}  // namespace
+
+void describeRun(const StudyOptions& options, RunFacts& facts) {
+  facts.version = versionText();
+  facts.machine = machineName();
+  facts.date = image::currentCapDate();
+  facts.threads = options.threads;
+  facts.quick = options.quick;
 }
 
 RunFolder::RunFolder(fs::path path) : m_path(std::move(path)) {

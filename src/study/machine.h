@@ -1,13 +1,15 @@
 #pragma once
-// What studies share: the machine's name, the folder of their runs.
+// What studies share: the facts of a run, the folder of its files.
 
 #include <filesystem>
-#include <string>
+
+#include "photosphere/study/result.h"
+#include "photosphere/study/study.h"
 
 namespace photosphere::study {
 
-/// Processor and system.
-std::string machineName();
+/// Fills version, processor and system, date, threads and size of a run.
+void describeRun(const StudyOptions& options, RunFacts& facts);
 
 /// A folder that disappears with the object, however the study ends.
 class RunFolder {

@@ -15,10 +15,8 @@
 #include "photosphere/core/log.h"
 #include "photosphere/core/progress.h"
 #include "photosphere/core/resources.h"
-#include "photosphere/core/version.h"
 #include "photosphere/estimators/photon_map.h"
 #include "photosphere/image/exr.h"
-#include "photosphere/image/exr_attributes.h"
 #include "reference.h"
 
 namespace photosphere::study {
@@ -47,12 +45,8 @@ class Paper {
 
   PaperResult run() {
     PaperResult result;
-    result.version = versionText();
-    result.machine = machineName();
-    result.date = image::currentCapDate();
-    result.threads = m_options.threads;
+    describeRun(m_options, result);
     result.minutes = m_minutes;
-    result.quick = m_options.quick;
     result.width = result.height = m_edge;
     prepare(result);
     Progress progress("paper", kRepeats * m_tasks.size());

@@ -172,9 +172,7 @@ std::string jsonOf(const PaperResult& result) {
 void writePaperReport(const PaperResult& result, const StudyOptions& options) {
   writeFile(options.output / "paper.csv", csvOf(result));
   writeFile(options.output / "paper.json", jsonOf(result));
-  const PictureSettings settings{image::ColorConfig::load(options.ocioConfig),
-                                 result.renderingSpace, options.ocioDisplay, options.ocioView};
-  writeFile(options.output / "index.html", page(result, settings));
+  writeFile(options.output / "index.html", page(result, pictureSettings(result, options)));
 }
 
 }  // namespace photosphere::study

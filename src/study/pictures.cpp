@@ -28,6 +28,11 @@ double meanAt(const image::Image& image, std::size_t i) {
 
 }  // namespace
 
+PictureSettings pictureSettings(const RunFacts& facts, const StudyOptions& options) {
+  return {image::ColorConfig::load(options.ocioConfig), facts.renderingSpace, options.ocioDisplay,
+          options.ocioView};
+}
+
 float exposureFor(const image::Image& reference) {
   std::vector<double> lit;
   for (std::size_t i = 0; i < reference.pixelCount(); ++i)

@@ -6,6 +6,7 @@
 
 #include "photosphere/image/color.h"
 #include "photosphere/study/result.h"
+#include "photosphere/study/study.h"
 
 namespace photosphere::study {
 
@@ -14,6 +15,9 @@ struct PictureSettings {
   image::ColorConfig config;
   std::string renderingSpace, display, view;
 };
+
+/// @throws what ColorConfig::load throws
+PictureSettings pictureSettings(const RunFacts& facts, const StudyOptions& options);
 
 /// The exposure [stops] that shows the 99th percentile of the reference's lit pixels as 0.7.
 float exposureFor(const image::Image& reference);

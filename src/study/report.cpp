@@ -176,9 +176,7 @@ std::string page(const StudyResult& result, const PictureSettings& settings) {
 void writeReport(const StudyResult& result, const StudyOptions& options) {
   writeFile(options.output / "study.csv", csvText(result));
   writeFile(options.output / "study.json", jsonText(result));
-  const PictureSettings settings{image::ColorConfig::load(options.ocioConfig),
-                                 result.renderingSpace, options.ocioDisplay, options.ocioView};
-  writeFile(options.output / "index.html", page(result, settings));
+  writeFile(options.output / "index.html", page(result, pictureSettings(result, options)));
 }
 
 }  // namespace photosphere::study

@@ -14,8 +14,6 @@
 #include "photosphere/core/error.h"
 #include "photosphere/core/log.h"
 #include "photosphere/core/resources.h"
-#include "photosphere/core/version.h"
-#include "photosphere/image/exr_attributes.h"
 #include "sweep.h"
 
 namespace photosphere::study {
@@ -94,13 +92,9 @@ class Study {
   void describe(StudyResult& result) const {
     result.scene = m_options.scene.string();
     result.frame = m_frame;
-    result.version = versionText();
-    result.machine = machineName();
-    result.date = image::currentCapDate();
+    describeRun(m_options, result);
     result.renderingSpace = m_source.open().output.text("colorspace");
-    result.threads = m_options.threads;
     result.minutes = m_seconds / 60;
-    result.quick = m_options.quick;
     measureStart(result);
   }
 

@@ -34,11 +34,7 @@ struct PaperExhibit {
   std::vector<PaperRow> rows;  ///< ratios are over the first
 };
 
-struct PaperResult {
-  std::string version, machine, date, renderingSpace;
-  unsigned threads = 0;
-  double minutes = 0, elapsedSeconds = 0;
-  bool quick = false;
+struct PaperResult : RunFacts {
   int width = 0, height = 0;
   std::vector<PaperExhibit> exhibits;
 };

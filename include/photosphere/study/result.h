@@ -106,15 +106,18 @@ struct FlickerRow {
   Estimate relMse;  ///< t-interval over the seeds
 };
 
-/// Everything that the report shows.
-struct StudyResult {
-  std::string scene;  ///< path
-  std::int64_t frame = 1;
-  std::string version, machine, date;
+/// With what, on what and for how long was measured.
+struct RunFacts {
+  std::string version, machine, date, renderingSpace;
   unsigned threads = 0;
-  std::string renderingSpace;
   double minutes = 0, elapsedSeconds = 0;
   bool quick = false;
+};
+
+/// Everything that the report shows.
+struct StudyResult : RunFacts {
+  std::string scene;  ///< path
+  std::int64_t frame = 1;
   Spread startSeconds;  ///< a child process that does nothing: its start and end
   std::uint64_t startMemoryBytes = 0;
   std::vector<SweepResult> sweeps;  ///< first the scene itself, then the hard cases
