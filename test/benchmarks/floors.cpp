@@ -52,26 +52,20 @@ void pathScatterings(benchmark::State& state) {
 }
 BENCHMARK(pathScatterings)->Unit(benchmark::kSecond)->UseRealTime();
 
-// The plume's truth, in two halves.
-struct Truth {
-  TestScene scene = plumeScene(0.7, 96, 96);
-  render::FrameLayers a = renderPath(scene, 1024, 101), b = renderPath(scene, 1024, 102);
-  double relMse(const render::FrameLayers& frame) const {
-    return layerError(frame.beauty, a.beauty, b.beauty, a.transmittance, 96).relMse;
-  }
-};
-const Truth& truth() {
-  static const Truth instance;
-  return instance;
+const TestScene& plume() {
+  static const TestScene scene = plumeScene(0.7, 96, 96);
+  return scene;
+}
+double relMse(const render::FrameLayers& frame) {
+  static const Truth truth = pathTruth(plume(), 1024, 101);
+  return truth.errorOf(frame, &render::FrameLayers::beauty).relMse;
 }
 
 void photosphereToError(benchmark::State& state) {
-  truth();
   PhotosphereFrame frame;
   for (auto _ : state)
-    frame = renderPhotosphere(truth().scene, greyLayout(),
-                              static_cast<std::uint64_t>(state.range(0)), 5);
-  state.counters["relMSE"] = truth().relMse(frame.layers);
+    frame = renderPhotosphere(plume(), greyLayout(), static_cast<std::uint64_t>(state.range(0)), 5);
+  state.counters["relMSE"] = relMse(frame.layers);
 }
 BENCHMARK(photosphereToError)
     ->Arg(20'000)
@@ -82,16 +76,15 @@ BENCHMARK(photosphereToError)
     ->UseRealTime();
 
 void pathToError(benchmark::State& state) {
-  truth();
   render::FrameLayers frame;
   Stopwatch watch;
   for (auto _ : state)
-    frame = renderPath(truth().scene, static_cast<int>(state.range(0)), 5);
+    frame = renderPath(plume(), static_cast<int>(state.range(0)), 5);
   const double seconds = watch.seconds() / static_cast<double>(state.iterations());
-  const double relMse = truth().relMse(frame);
-  state.counters["relMSE"] = relMse;
-  // Its error falls as one over the samples.
-  state.counters["seconds_to_0.02"] = seconds * relMse / kTargetRelMse;
+  const double error = relMse(frame);
+  state.counters["relMSE"] = error;
+  // It falls as one over the samples.
+  state.counters["seconds_to_0.02"] = seconds * error / kTargetRelMse;
 }
 BENCHMARK(pathToError)->Arg(16)->Arg(64)->Arg(256)->Unit(benchmark::kSecond)->UseRealTime();
 

@@ -96,24 +96,11 @@ const Row kRows[] = {
      }},
 };
 
-// Particles spread in proportion to extinction, as `convert` seeds them.
-std::vector<Vec3f> seeded(const transport::Medium& medium, std::size_t count) {
-  std::vector<Vec3f> particles;
-  Rng rng(RandomKey::fromSeed(3, 0), RandomStream::particles, 0);
-  const Vec3f low(medium.bounds().min), extent(medium.bounds().extent());
-  const float largest = medium.majorants().maximum();
-  while (particles.size() < count) {
-    const Vec3f p = low + extent * Vec3f(rng.uniform(), rng.uniform(), rng.uniform());
-    if (rng.uniform() * largest < medium.extinction(p)) particles.push_back(p);
-  }
-  return particles;
-}
-
 TEST(DirectionOptions, AgreeWithPathTracingOnThePlume) {
   if (kSanitized) GTEST_SKIP() << "a mean of many paths, too slow under a sanitizer";
   TestScene scene = plumeScene(0.7, 64, kPixels);
-  scene.particles = seeded(*scene.medium, 15000);
-  const render::FrameLayers a = renderPath(scene, 192, 1), b = renderPath(scene, 192, 2);
+  scene.particles = seedParticles(*scene.medium, 15000);
+  const Truth truth = pathTruth(scene, 192);
   for (const Row& row : kRows) {
     LightFieldLayout layout;
     layout.basis = Basis::histogram;
@@ -123,8 +110,7 @@ TEST(DirectionOptions, AgreeWithPathTracingOnThePlume) {
     const std::uint64_t photons = layout.carrier == Carrier::voxels ? 200'000 : 60'000;
     const PhotosphereFrame frame = renderPhotosphere(scene, layout, photons, 5);
     EXPECT_EQ(frame.layers.nanSamples + frame.layers.negativeSamples, 0u) << row.name;
-    const LayerError error =
-        layerError(frame.layers.multiple, a.multiple, b.multiple, a.transmittance, kPixels);
+    const LayerError error = truth.errorOf(frame.layers, &render::FrameLayers::multiple);
     std::printf("  %-38s mean %.4f  relMSE %.5f  trace %.2f  resolve %.2f  march %.2f s\n",
                 row.name, error.meanRatio, error.relMse, frame.traceSeconds, frame.resolveSeconds,
                 frame.marchSeconds);

@@ -47,32 +47,21 @@ TestScene burningPlume(double g) {
     const double first = std::exp(-80 * glm::dot(a, a)), second = std::exp(-120 * glm::dot(b, b));
     return Rgb(Vec3d(90, 40, 10) * first + Vec3d(10, 20, 60) * second);
   });
-  TestScene scene;
-  scene.medium = std::make_unique<transport::Medium>(makeMedium(std::move(v)));
-  scene.lights.push_back(makeLight("spot", {{"position", "[2, -1, 2]"},
-                                            {"target", "[0, 0, 0.1]"},
-                                            {"intensity", "30"},
-                                            {"cone_angle", "8"},
-                                            {"cone_edge", "2"}}));
-  scene.camera = perspectiveCamera({0, -3, 0.4}, 22, kPixels);
+  TestScene scene = plumeScene(std::move(v), kPixels);
   scene.particles = seedParticles(*scene.medium, 60'000);
   return scene;
 }
 
 TEST_P(Glow, AgreesWithPathTracing) {
   const TestScene scene = burningPlume(0.6);
-  static const render::FrameLayers a = renderPath(scene, kSanitized ? 2 : 128, 1);
-  static const render::FrameLayers b = renderPath(scene, kSanitized ? 2 : 128, 2);
+  static const Truth truth = pathTruth(scene, kSanitized ? 2 : 128);
   const PhotosphereFrame frame = renderPhotosphere(scene, layout(3), kPhotons, 5);
   EXPECT_EQ(frame.layers.nanSamples + frame.layers.negativeSamples, 0u);
   EXPECT_GT(frame.statistics.born, frame.statistics.photons / 10);
   if (kSanitized) return;  // too few paths to judge by
-  const LayerError total =
-      layerError(frame.layers.beauty, a.beauty, b.beauty, a.transmittance, kPixels);
-  const LayerError multiple =
-      layerError(frame.layers.multiple, a.multiple, b.multiple, a.transmittance, kPixels);
-  const LayerError emission =
-      layerError(frame.layers.emission, a.emission, b.emission, a.transmittance, kPixels);
+  const LayerError total = truth.errorOf(frame.layers, &render::FrameLayers::beauty);
+  const LayerError multiple = truth.errorOf(frame.layers, &render::FrameLayers::multiple);
+  const LayerError emission = truth.errorOf(frame.layers, &render::FrameLayers::emission);
   std::printf("  total: mean ratio %.4f, relMSE %.5f; multiple: %.4f, %.5f; emission: %.4f, %.5f\n",
               total.meanRatio, total.relMse, multiple.meanRatio, multiple.relMse,
               emission.meanRatio, emission.relMse);

@@ -124,11 +124,10 @@ TEST(Harmonics, AgreeWithPathTracing) {
   } rows[] = {{0.4, 4, 0.03, 0.02}, {0.7, 8, 0.06, 0.06}};
   for (const auto& row : rows) {
     const TestScene& scene = plume(row.g).scene;
-    const render::FrameLayers a = renderPath(scene, 96, 1), b = renderPath(scene, 96, 2);
+    const Truth truth = pathTruth(scene, 96);
     const PhotosphereFrame f =
         renderPhotosphere(scene, layoutOf(Basis::sphericalHarmonics, row.order), kPhotons, 5);
-    const LayerError e =
-        layerError(f.layers.multiple, a.multiple, b.multiple, a.transmittance, kPixels);
+    const LayerError e = truth.errorOf(f.layers, &render::FrameLayers::multiple);
     std::printf("  g %.1f, order %d: mean ratio %.4f, relMSE %.5f, reference noise %.5f\n", row.g,
                 row.order, e.meanRatio, e.relMse, e.referenceNoise);
     EXPECT_NEAR(e.meanRatio, 1.0, row.mean) << row.g;

@@ -32,10 +32,9 @@ PhotonMapLayout greyLayout(double radius = 0.0, std::uint32_t neighbors = 0) {
   return layout;
 }
 
-// A scene with its path-traced truth in two independent halves.
 struct Judged {
   TestScene scene;
-  render::FrameLayers a, b;
+  Truth truth;
 };
 
 const Judged& judged(const std::string& name) {
@@ -44,14 +43,12 @@ const Judged& judged(const std::string& name) {
   if (found != cache.end()) return found->second;
   Judged j;
   j.scene = name == "sphere" ? sphereScene(6, 0.9, 0.4, 32, kPixels) : plumeScene(0.7, 64, kPixels);
-  j.a = renderPath(j.scene, kSanitized ? 2 : 192, 1);
-  j.b = renderPath(j.scene, kSanitized ? 2 : 192, 2);
+  j.truth = pathTruth(j.scene, kSanitized ? 2 : 192);
   return cache.emplace(name, std::move(j)).first->second;
 }
 
 LayerError multipleError(const Judged& j, const render::FrameLayers& layers) {
-  const LayerError e =
-      layerError(layers.multiple, j.a.multiple, j.b.multiple, j.a.transmittance, kPixels);
+  const LayerError e = j.truth.errorOf(layers, &render::FrameLayers::multiple);
   std::printf("  mean ratio %.4f, relMSE %.5f (reference noise %.5f)\n", e.meanRatio, e.relMse,
               e.referenceNoise);
   return e;

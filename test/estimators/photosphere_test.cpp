@@ -32,10 +32,9 @@ std::uint64_t photonSeed() {
   return text ? std::strtoull(text, nullptr, 10) : 5;
 }
 
-// A scene with its path-traced truth in two independent halves.
 struct Judged {
   TestScene scene;
-  render::FrameLayers a, b;
+  Truth truth;
 };
 
 const Judged& judged(const std::string& name) {
@@ -47,8 +46,7 @@ const Judged& judged(const std::string& name) {
   if (name == "plume") j.scene = plumeScene(0.7, 96, kPixels);
   if (name == "column") j.scene = columnScene(kPixels);
   j.scene.particles = seedParticles(*j.scene.medium, 60000);
-  j.a = renderPath(j.scene, kSanitized ? 2 : 384, 1);
-  j.b = renderPath(j.scene, kSanitized ? 2 : 384, 2);
+  j.truth = pathTruth(j.scene, kSanitized ? 2 : 384);
   return cache.emplace(name, std::move(j)).first->second;
 }
 
@@ -79,10 +77,8 @@ TEST_P(Agreement, WithPathTracing) {
   layout.order = 8;
   layout.channels = 1;
   const PhotosphereFrame frame = renderPhotosphere(j.scene, layout, kManyPhotons, photonSeed());
-  const LayerError total =
-      layerError(frame.layers.beauty, j.a.beauty, j.b.beauty, j.a.transmittance, kPixels);
-  const LayerError multiple =
-      layerError(frame.layers.multiple, j.a.multiple, j.b.multiple, j.a.transmittance, kPixels);
+  const LayerError total = j.truth.errorOf(frame.layers, &render::FrameLayers::beauty);
+  const LayerError multiple = j.truth.errorOf(frame.layers, &render::FrameLayers::multiple);
   std::printf(
       "  total: mean ratio %.4f, relMSE %.5f (smoke %.5f); multiple: %.4f, %.5f (smoke %.5f); "
       "reference noise %.5f\n",

@@ -75,9 +75,12 @@ TestScene sphereScene(double tau, double albedo, double g, int cells, int pixels
 }
 
 TestScene plumeScene(double g, int cells, int pixels) {
+  return plumeScene(sampledVolume(1.0, cells, {0.95, g, 30.0}, plumeDensity), pixels);
+}
+
+TestScene plumeScene(transport::MediumVolume smoke, int pixels) {
   TestScene scene;
-  scene.medium = std::make_unique<transport::Medium>(
-      makeMedium(sampledVolume(1.0, cells, {0.95, g, 30.0}, plumeDensity)));
+  scene.medium = std::make_unique<transport::Medium>(makeMedium(std::move(smoke)));
   scene.lights.push_back(makeLight("spot", {{"position", "[2, -1, 2]"},
                                             {"target", "[0, 0, 0.1]"},
                                             {"intensity", "30"},
@@ -160,30 +163,32 @@ BlockDeviation deviationFromOne(const std::vector<Rgb>& image, int width, int bl
   return off;
 }
 
-LayerError layerError(const std::vector<Rgb>& image, const std::vector<Rgb>& referenceA,
-                      const std::vector<Rgb>& referenceB, const std::vector<Rgb>& transmittance,
-                      int width) {
+Truth pathTruth(const TestScene& scene, int samples, std::uint64_t firstSeed) {
+  return {renderPath(scene, samples, firstSeed), renderPath(scene, samples, firstSeed + 1)};
+}
+
+LayerError Truth::errorOf(const render::FrameLayers& frame, Layer layer) const {
   std::vector<std::vector<float>> planes, references, variances;
   for (int c = 0; c < 3; ++c) {
-    planes.push_back(plane(image, c));
-    const auto a = plane(referenceA, c), b = plane(referenceB, c);
-    std::vector<float> mean(a.size());
-    for (std::size_t i = 0; i < a.size(); ++i)
-      mean[i] = 0.5f * (a[i] + b[i]);
+    planes.push_back(plane(frame.*layer, c));
+    const auto first = plane(a.*layer, c), second = plane(b.*layer, c);
+    std::vector<float> mean(first.size());
+    for (std::size_t i = 0; i < first.size(); ++i)
+      mean[i] = 0.5f * (first[i] + second[i]);
     references.push_back(std::move(mean));
-    variances.push_back(image::varianceOfMean(a, b));
+    variances.push_back(image::varianceOfMean(first, second));
   }
   image::MeasureOptions options;
   for (const auto& v : variances)
     options.referenceVariance.emplace_back(v);
   std::vector<std::span<const float>> x(planes.begin(), planes.end()),
       r(references.begin(), references.end());
-  const image::ErrorMetrics all = image::measure(x, r, width, Vec2i(0), options);
+  const image::ErrorMetrics all = image::measure(x, r, frame.width(), Vec2i(0), options);
   std::vector<unsigned char> mask;
-  for (const Rgb& t : transmittance)
+  for (const Rgb& t : a.transmittance)
     mask.push_back(meanComponent(t) < 0.99f);
   options.mask = mask;
-  const image::ErrorMetrics smoke = image::measure(x, r, width, Vec2i(0), options);
+  const image::ErrorMetrics smoke = image::measure(x, r, frame.width(), Vec2i(0), options);
   return {all.unbiasedRelMse, smoke.unbiasedRelMse, all.meanRatio, all.referenceNoise};
 }
 

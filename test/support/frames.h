@@ -28,12 +28,29 @@ std::unique_ptr<cameras::Camera> perspectiveCamera(const Vec3d& eye, double fov,
 TestScene sphereScene(double tau, double albedo, double g, int cells, int pixels);
 /// Fractal plume in a unit cube, lit by a spot from above and the side.
 TestScene plumeScene(double g, int cells, int pixels);
+/// The same lamp and camera over other smoke in a unit cube.
+TestScene plumeScene(transport::MediumVolume smoke, int pixels);
 
 /// Particles spread over the smoke in proportion to its extinction, as `convert` seeds them.
 std::vector<Vec3f> seedParticles(const transport::Medium& medium, std::size_t count);
 
 /// A frame rendered by path tracing.
 render::FrameLayers renderPath(const TestScene& scene, int samples, std::uint64_t seed);
+
+/// Error of one layer against the mean of two independent references, noise subtracted.
+struct LayerError {
+  double relMse = 0, relMseSmoke = 0, meanRatio = 0, referenceNoise = 0;
+};
+
+/// What path tracing gives, in two independent halves.
+struct Truth {
+  using Layer = std::vector<Rgb> render::FrameLayers::*;
+  LayerError errorOf(const render::FrameLayers& frame, Layer layer) const;
+
+  render::FrameLayers a, b;
+};
+/// @param samples  paths a pixel of each half
+Truth pathTruth(const TestScene& scene, int samples, std::uint64_t firstSeed = 1);
 
 struct PhotosphereFrame {
   render::FrameLayers layers;
@@ -51,14 +68,6 @@ PhotosphereFrame renderPhotosphere(const TestScene& scene, estimators::LightFiel
 /// the map count as `traceSeconds`.
 PhotosphereFrame renderPhotonMap(const TestScene& scene, estimators::PhotonMapLayout layout,
                                  std::uint64_t photons, std::uint64_t seed, int samples = 4);
-
-/// Error of one layer against the mean of two independent references, noise subtracted.
-struct LayerError {
-  double relMse = 0, relMseSmoke = 0, meanRatio = 0, referenceNoise = 0;
-};
-LayerError layerError(const std::vector<Rgb>& image, const std::vector<Rgb>& referenceA,
-                      const std::vector<Rgb>& referenceB, const std::vector<Rgb>& transmittance,
-                      int width);
 
 /// Mean of an image, and how far the worst square block's mean is from 1: what a furnace is judged
 /// by.
