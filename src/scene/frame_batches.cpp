@@ -235,15 +235,19 @@ class FrameLoop {
     for (Vec3d* power : {&s.energyEmitted, &s.energyMissed, &s.energyAbsorbed, &s.energyEscaped,
                          &s.energyCapped, &s.energyError})
       *power /= static_cast<double>(batches);
-    if (batches < 2) {
-      s.targetMissed = m_target > 0;
-      return;
-    }
+    const bool tooFew = m_target > 0 && batches < m_setup.batches;
+    s.targetMissed = tooFew;
+    if (tooFew)
+      m_setup.notes.push_back(fmt::format(
+          "render.time_limit ended the frame after {} of the {} parts that its error is judged by; "
+          "raise it, or lower estimator.photons",
+          batches, m_setup.batches));
+    if (batches < 2) return;
     s.error = m_error.estimate();
-    s.targetMissed = m_target > 0 && (batches < m_setup.batches || s.error->total() > m_target);
     m_result.error = m_error.standardError();
     m_result.layerNames.emplace_back("error");
-    if (!s.targetMissed) return;
+    if (tooFew || !(m_target > 0) || s.error->total() <= m_target) return;
+    s.targetMissed = true;
     m_setup.notes.push_back(
         fmt::format("the estimated error {:.4g} (noise {:.4g}, bias {:.4g}) misses "
                     "render.target_error {:.4g}: {}",

@@ -181,6 +181,8 @@ TEST_F(TargetError, TimeEndsItAfterThePartAtHand) {
   EXPECT_EQ(r.statistics.batches, 1);
   EXPECT_TRUE(r.statistics.targetMissed);
   EXPECT_FALSE(r.statistics.error);  // one batch has no spread
+  ASSERT_FALSE(r.notes.empty());
+  EXPECT_TRUE(contains(r.notes.back(), "1 of the 8 parts")) << r.notes.back();
   const FrameResult limit = render({"estimator.photons=800", "render.time_limit=1e-9"});
   EXPECT_EQ(limit.statistics.batches, 1);
   EXPECT_FALSE(limit.statistics.targetMissed);
