@@ -40,9 +40,7 @@ double cellVolume(const Mat4d& m) {
 
 Emission::Emission(const std::vector<const VolumeEmission*>& volumes) {
   for (const VolumeEmission* v : volumes) {
-    const Mat4d inverse = glm::inverse(v->localFromNode);
-    m_placed.push_back({&v->field, Vec3f(inverse[0]), Vec3f(inverse[1]), Vec3f(inverse[2]),
-                        Vec3f(inverse[3]), v->localFromNode});
+    m_placed.push_back({&v->field, volume::NodeFromLocal(v->localFromNode), v->localFromNode});
     m_region.box.grow(volume::supportBounds(v->field, v->localFromNode));
     m_region.spacing = std::min(m_region.spacing, volume::finestSpacing(v->localFromNode));
     const double watts = 4.0 * kPi * cellVolume(v->localFromNode);

@@ -32,14 +32,7 @@ bool isGrey(const Rgb& c) {
 
 Medium::Placed Medium::place(const volume::BrickField<float>& field, const Mat4d& localFromNode,
                              double scale, int phaseIndex) {
-  const Mat4d inverse = glm::inverse(localFromNode);
-  return {&field,
-          Vec3f(inverse[0]),
-          Vec3f(inverse[1]),
-          Vec3f(inverse[2]),
-          Vec3f(inverse[3]),
-          static_cast<float>(scale),
-          phaseIndex};
+  return {&field, volume::NodeFromLocal(localFromNode), static_cast<float>(scale), phaseIndex};
 }
 
 Medium::Medium(std::vector<MediumVolume> volumes) : m_volumes(std::move(volumes)) {

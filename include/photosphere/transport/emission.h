@@ -35,7 +35,7 @@ class Emission {
   Rgb at(const Vec3f& p) const {
     Vec4f sum(0.0f);
     for (const Placed& v : m_placed)
-      sum += v.field->sample(v.column0 * p.x + v.column1 * p.y + v.column2 * p.z + v.offset);
+      sum += v.field->sample(v.nodeFromLocal(p));
     return Rgb(sum);
   }
   /// What emits, for the lattice that rays walk.
@@ -67,7 +67,7 @@ class Emission {
  private:
   struct Placed {
     const volume::BrickField<Vec4f>* field;
-    Vec3f column0, column1, column2, offset;  // node = column * local + offset
+    volume::NodeFromLocal nodeFromLocal;
     Mat4d localFromNode;
   };
   // A stored brick, and the integral of the largest channel up to and with it [W].

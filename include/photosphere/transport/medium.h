@@ -61,7 +61,7 @@ class Medium {
         : m_medium(&medium), m_origin(o), m_direction(d) {
       const Placed& first = medium.m_placed.front();
       m_nodeOrigin = first.nodeFromLocal(o);
-      m_nodeDirection = first.nodeFromLocalDirection(d);
+      m_nodeDirection = first.nodeFromLocal.direction(d);
     }
     /// sigma_t [1/m] at a distance [m].
     float operator()(float t) const {
@@ -104,13 +104,9 @@ class Medium {
   // What the lookup loop reads, compact.
   struct Placed {
     const volume::BrickField<float>* field;
-    Vec3f column0, column1, column2, offset;  // node = column * local + offset
+    volume::NodeFromLocal nodeFromLocal;
     float scale;
     int phaseIndex;
-    Vec3f nodeFromLocal(const Vec3f& p) const { return nodeFromLocalDirection(p) + offset; }
-    Vec3f nodeFromLocalDirection(const Vec3f& d) const {
-      return column0 * d.x + column1 * d.y + column2 * d.z;
-    }
   };
   struct Albedo {
     Rgb constant{0.0f};

@@ -108,6 +108,23 @@ class BrickField {
   std::vector<std::uint8_t> m_constant;
 };
 
+/// The way from a place to node positions of a field, in float: what lookups take.
+class NodeFromLocal {
+ public:
+  explicit NodeFromLocal(const Mat4d& localFromNode) {
+    const Mat4d inverse = glm::inverse(localFromNode);
+    m_x = Vec3f(inverse[0]);
+    m_y = Vec3f(inverse[1]);
+    m_z = Vec3f(inverse[2]);
+    m_offset = Vec3f(inverse[3]);
+  }
+  Vec3f operator()(const Vec3f& p) const { return direction(p) + m_offset; }
+  Vec3f direction(const Vec3f& d) const { return m_x * d.x + m_y * d.y + m_z * d.z; }
+
+ private:
+  Vec3f m_x, m_y, m_z, m_offset;
+};
+
 extern template class BrickField<float>;
 extern template class BrickField<Vec4f>;
 
