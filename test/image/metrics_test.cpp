@@ -13,7 +13,7 @@
 namespace photosphere::image {
 namespace {
 
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+constexpr float kNotANumber = std::numeric_limits<float>::quiet_NaN();
 
 ErrorMetrics measureGrey(const std::vector<float>& image, const std::vector<float>& reference,
                          const MeasureOptions& options = {}) {
@@ -60,7 +60,8 @@ TEST(Metrics, equalImagesAndBlackImages) {
 }
 
 TEST(Metrics, nonFinitePixelsAreCountedAndLeftOut) {
-  const ErrorMetrics m = measureGrey({kNan, 2.0f, kInfinity, 5.0f}, {1.0f, kNan, kInfinity, 4.0f});
+  const ErrorMetrics m =
+      measureGrey({kNotANumber, 2.0f, kInfinity, 5.0f}, {1.0f, kNotANumber, kInfinity, 4.0f});
   EXPECT_EQ(m.nonFiniteImage, 1u);
   EXPECT_EQ(m.nonFiniteReference, 1u);
   EXPECT_EQ(m.pixels, 1u);

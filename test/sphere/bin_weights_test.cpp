@@ -46,12 +46,12 @@ std::vector<double> bruteForce(const Partition& partition, double g, const Vec3f
   return means;
 }
 
-struct Setting {
+struct WeightSetting {
   int rows;
   double g;
 };
 
-class Weights : public ::testing::TestWithParam<Setting> {};
+class Weights : public ::testing::TestWithParam<WeightSetting> {};
 
 // At nodes of the lattice no interpolation acts: quadrature alone, to 0.1 % of every weight.
 TEST_P(Weights, AreBinAveragesAtTheNodes) {
@@ -112,9 +112,11 @@ TEST_P(Weights, SumToOneInEveryDirection) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Sphere, Weights,
-                         ::testing::Values(Setting{1, 0.4}, Setting{1, 0.9}, Setting{2, 0.0},
-                                           Setting{2, 0.7}, Setting{2, -0.7}, Setting{3, 0.5},
-                                           Setting{2, 0.95}, Setting{4, 0.9}, Setting{4, -0.95}));
+                         ::testing::Values(WeightSetting{1, 0.4}, WeightSetting{1, 0.9},
+                                           WeightSetting{2, 0.0}, WeightSetting{2, 0.7},
+                                           WeightSetting{2, -0.7}, WeightSetting{3, 0.5},
+                                           WeightSetting{2, 0.95}, WeightSetting{4, 0.9},
+                                           WeightSetting{4, -0.95}));
 
 // A uniform histogram scatters to 1 / (4 pi), and an isotropic phase has equal weights.
 TEST(BinWeights, OfAnIsotropicPhaseAreEqual) {

@@ -61,7 +61,8 @@ struct SinCos {
 };
 inline SinCos fastSinCosTurns(float turns) {
   const float scaled = turns * 4.0f;
-  const int quadrant = static_cast<int>(scaled + 0.5f);
+  const float shifted = scaled + 0.5f;  // not negative, so the cast below rounds to the nearest
+  const int quadrant = static_cast<int>(shifted);
   const float r = (scaled - static_cast<float>(quadrant)) * 1.57079632679489662f;  // +-pi/4
   const float z = r * r;
   const float s = ((-1.9515295891e-4f * z + 8.3321608736e-3f) * z - 1.6666654611e-1f) * z * r + r;
