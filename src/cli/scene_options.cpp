@@ -177,9 +177,10 @@ void printDryRun(std::int64_t frame, const std::string& output, std::int64_t cac
 
 std::string formatSeconds(const scene::StageSeconds& seconds) {
   return fmt::format(
-      "read {:.2f}, rasterize {:.2f}, trace {:.2f}, resolve {:.2f}, march {:.2f}, write {:.2f}, "
+      "read {:.2f}, rasterize {:.2f}, trace {:.2f}, resolve {:.2f}, march {:.2f}, {}write {:.2f}, "
       "total {:.2f} s",
-      seconds.read, seconds.rasterize, seconds.trace, seconds.resolve, seconds.march, seconds.write,
+      seconds.read, seconds.rasterize, seconds.trace, seconds.resolve, seconds.march,
+      seconds.check > 0 ? fmt::format("check {:.2f}, ", seconds.check) : "", seconds.write,
       seconds.total);
 }
 

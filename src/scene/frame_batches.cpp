@@ -117,6 +117,10 @@ render::FrameOptions frameOptions(const SceneFile& scene, const render::Crop& cr
   return options;
 }
 
+// Paths of one truth that a frame's stored light is held against. Blocks are as many in every
+// frame, so what they need does not grow with its pixels.
+constexpr std::int64_t kTruthPaths = 150'000;
+
 // Rays through the smoke, for one pass of a frame or several.
 class LayerRenderer {
  public:
@@ -124,7 +128,7 @@ class LayerRenderer {
       : m_setup(setup),
         m_paths(scene.estimator.text("type") == "path_traced"),
         m_options(frameOptions(scene, crop, setup, m_paths)) {
-    m_path.maxScatter = static_cast<int>(scene.estimator.integer("max_scatter"));
+    if (m_paths) m_path.maxScatter = static_cast<int>(scene.estimator.integer("max_scatter"));
     m_path.effects = m_march.effects = setup.effects;
     m_march.step = static_cast<float>(scene.render.real("step"));
     if (m_paths) return;
@@ -154,6 +158,19 @@ class LayerRenderer {
     return layers;
   }
 
+  /// `beauty` as path tracing has it, from a few paths a pixel and random numbers of its own.
+  std::vector<Rgb> truth(RandomKey key) const {
+    render::FrameOptions options = m_options;
+    const Vec2i size = options.crop.max - options.crop.min;
+    const std::int64_t pixels = std::max<std::int64_t>(1, std::int64_t{size.x} * size.y);
+    options.samples = static_cast<int>(std::clamp<std::int64_t>(kTruthPaths / pixels, 1, 64));
+    options.key = key;
+    const auto integrator = render::makePathIntegrator(*m_setup.medium, m_setup.lights, m_path);
+    render::FrameLayers layers = render::renderFrame(*m_setup.camera, *integrator, options);
+    dropLayers(m_setup.effects, layers);
+    return std::move(layers.beauty);
+  }
+
  private:
   const FrameSetup& m_setup;
   bool m_paths;
@@ -178,31 +195,37 @@ class FrameLoop {
         m_target(scene.render.real("target_error")),
         m_timeLimit(scene.render.real("time_limit")),
         m_passes(setup.photonMap ? setup.photonMap->passes : 1),
+        m_checked(m_target > 0 && storesLight(scene, setup)),
+        m_key(setup.key),
         m_error(crop.max.x - crop.min.x) {}
 
   void run() {
-    const RandomKey key = m_setup.key;
-    const auto seed = static_cast<std::uint64_t>(key.hi) << 32 | key.lo;
-    std::size_t notes = 0;
-    int batch = 0;
     do {
-      if (batch > 0) m_setup.key = RandomKey::fromSeed(seed, batch);
-      renderBatch();
-      // What a batch has to say it says once.
-      if (batch == 0) notes = m_setup.notes.size();
-      m_setup.notes.resize(notes);
-    } while (!done(++batch));
-    m_setup.key = key;
+      if (wantsBatch())
+        renderBatch();
+      else
+        renderTruth();
+    } while (!done());
     if (!once()) m_result.layers = m_mean.mean();
-    m_result.statistics.batches = batch;
-    if (m_setup.batches > 1) reportError(batch);
+    m_result.statistics.batches = m_batches;
+    if (m_setup.batches > 1) reportError();
   }
 
  private:
+  // Stored light is biased, so its frames are held against path traced ones: turn by turn at
+  // first, then whichever leaves the greater doubt is rendered.
+  bool wantsBatch() const {
+    if (!m_checked) return true;
+    if (m_error.truths() < m_setup.batches) return m_batches <= m_error.truths();
+    return m_estimate.noise >= m_estimate.doubt;
+  }
+
   // One batch: all passes of a progressive photon map, one of everything else.
   void renderBatch() {
+    m_setup.key = m_batches == 0 ? m_key : RandomKey::fromSeed(seed(), m_batches);
     const bool judged = m_setup.batches > 1;
-    const bool wider = m_target > 0 && m_error.batches() < m_setup.batches;
+    const bool wider = m_target > 0 && m_batches < m_setup.batches;
+    const std::size_t notes = m_setup.notes.size();
     for (int pass = 0; pass < m_passes; ++pass) {
       const PassLight light = prepareLight(m_scene, m_request, pass, wider, m_setup, m_result);
       const Stopwatch watch;
@@ -216,44 +239,59 @@ class FrameLoop {
       if (once()) m_result.layers = std::move(layers);
       m_result.statistics.seconds.march += watch.seconds();
     }
+    // What a batch has to say it says once.
+    if (m_batches++ > 0) m_setup.notes.resize(notes);
+    m_setup.key = m_key;
   }
 
+  void renderTruth() {
+    const Stopwatch watch;
+    // Another seed than the batches': its bits turned over.
+    m_error.addTruth(m_renderer->truth(RandomKey::fromSeed(~seed(), m_error.truths())));
+    m_result.statistics.seconds.check += watch.seconds();
+  }
+
+  std::uint64_t seed() const { return static_cast<std::uint64_t>(m_key.hi) << 32 | m_key.lo; }
   bool once() const { return m_setup.batches == 1 && m_passes == 1; }
 
-  bool done(int batches) {
+  bool done() {
     if (m_timeLimit > 0 && m_watch.seconds() > m_timeLimit) return true;
-    if (batches < m_setup.batches) return false;
+    if (m_batches < m_setup.batches) return false;
+    if (m_checked && m_error.truths() < m_setup.batches) return false;
     if (!(m_target > 0)) return true;
-    const ErrorEstimate e = m_error.estimate();
-    // Photons do not mend a bias.
-    return e.total() <= m_target || (e.bias >= m_target && e.noise < 0.5 * e.bias);
+    const ErrorEstimate e = m_estimate = m_error.estimate();
+    if (e.bound() <= m_target) return true;
+    // Photons do not mend a bias that is beyond doubt.
+    const double sure = e.bias * e.bias - 2 * e.doubt * e.doubt;
+    return sure >= m_target * m_target && e.noise < 0.5 * e.bias;
   }
 
-  void reportError(int batches) {
+  void reportError() {
     FrameStatistics& s = m_result.statistics;
     // Every batch traced all the light there is.
     for (Vec3d* power : {&s.energyEmitted, &s.energyMissed, &s.energyAbsorbed, &s.energyEscaped,
                          &s.energyCapped, &s.energyError})
-      *power /= static_cast<double>(batches);
-    const bool tooFew = m_target > 0 && batches < m_setup.batches;
+      *power /= static_cast<double>(m_batches);
+    const bool tooFew = m_target > 0 && (m_batches < m_setup.batches ||
+                                         (m_checked && m_error.truths() < m_setup.batches));
     s.targetMissed = tooFew;
     if (tooFew)
       m_setup.notes.push_back(fmt::format(
           "render.time_limit ended the frame after {} of the {} parts that its error is judged by; "
           "raise it, or lower estimator.photons",
-          batches, m_setup.batches));
-    if (batches < 2) return;
+          m_batches < m_setup.batches ? m_batches : m_error.truths(), m_setup.batches));
+    if (m_batches < 2) return;
     s.error = m_error.estimate();
     m_result.error = m_error.standardError();
     m_result.layerNames.emplace_back("error");
-    if (tooFew || !(m_target > 0) || s.error->total() <= m_target) return;
+    if (tooFew || !(m_target > 0) || s.error->bound() <= m_target) return;
     s.targetMissed = true;
-    m_setup.notes.push_back(
-        fmt::format("the estimated error {:.4g} (noise {:.4g}, bias {:.4g}) misses "
-                    "render.target_error {:.4g}: {}",
-                    s.error->total(), s.error->noise, s.error->bias, m_target,
-                    s.error->bias >= m_target ? "lower estimator.radius or light_voxel"
-                                              : "raise render.time_limit"));
+    m_setup.notes.push_back(fmt::format(
+        "the estimated error {:.4g} (noise {:.4g}, bias {:.4g}, unsure by {:.4g}) misses "
+        "render.target_error {:.4g}: {}",
+        s.error->total(), s.error->noise, s.error->bias, s.error->doubt, m_target,
+        s.error->bias >= m_target ? "lower estimator.radius or light_voxel"
+                                  : "raise render.time_limit"));
   }
 
   const SceneFile& m_scene;
@@ -263,10 +301,13 @@ class FrameLoop {
   FrameSetup& m_setup;
   FrameResult& m_result;
   double m_target, m_timeLimit;
-  int m_passes;
+  int m_passes, m_batches = 0;
+  bool m_checked;  ///< against path traced frames
+  RandomKey m_key;
   std::optional<LayerRenderer> m_renderer;
   render::FrameMean m_mean;
   FrameError m_error;
+  ErrorEstimate m_estimate;  // once there are enough parts
 };
 
 }  // namespace

@@ -7,8 +7,60 @@ namespace photosphere::scene {
 
 namespace {
 
+// Blocks are at most this part of the frame's longer side.
+constexpr int kFewestBlocks = 32;
+// Share of the squared error that blocks may leave in doubt before larger ones are taken.
+constexpr double kDoubtShare = 0.1;
+
 double sumOf(const Vec3d& v) {
   return v.x + v.y + v.z;
+}
+
+double square(double x) {
+  return x * x;
+}
+
+// Means of 2 x 2 values each; of fewer at the right and lower border.
+std::vector<Rgb> halved(const std::vector<Rgb>& values, int width) {
+  const int height = static_cast<int>(values.size()) / width;
+  const int columns = (width + 1) / 2, rows = (height + 1) / 2;
+  std::vector<Rgb> out(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
+  for (int y = 0; y < rows; ++y)
+    for (int x = 0; x < columns; ++x) {
+      const int right = std::min(2 * x + 2, width), bottom = std::min(2 * y + 2, height);
+      Rgb sum(0.0f);
+      for (int v = 2 * y; v < bottom; ++v)
+        for (int u = 2 * x; u < right; ++u)
+          sum += values[static_cast<std::size_t>(v * width + u)];
+      out[static_cast<std::size_t>(y * columns + x)] =
+          sum / static_cast<float>((right - 2 * x) * (bottom - 2 * y));
+    }
+  return out;
+}
+
+// Weighted 1 2 1 along both axes, within the frame.
+std::vector<Rgb> softened(const std::vector<Rgb>& values, int width) {
+  const int height = static_cast<int>(values.size()) / width;
+  std::vector<Rgb> out(values.size());
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      Rgb sum(0.0f);
+      float weights = 0;
+      for (int v = std::max(0, y - 1); v <= std::min(y + 1, height - 1); ++v)
+        for (int u = std::max(0, x - 1); u <= std::min(x + 1, width - 1); ++u) {
+          const float weight = (u == x ? 2.0f : 1.0f) * (v == y ? 2.0f : 1.0f);
+          sum += weight * values[static_cast<std::size_t>(v * width + u)];
+          weights += weight;
+        }
+      out[static_cast<std::size_t>(y * width + x)] = sum / weights;
+    }
+  return out;
+}
+
+// Index of the block of the given level that holds pixel i.
+std::size_t blockOf(std::size_t i, int width, int columns, std::size_t level) {
+  const int x = static_cast<int>(i) % width >> level, y = static_cast<int>(i) / width >> level;
+  return static_cast<std::size_t>(y * columns + x);
 }
 
 }  // namespace
@@ -17,76 +69,207 @@ double ErrorEstimate::total() const {
   return std::sqrt(noise * noise + bias * bias);
 }
 
-void FrameError::Moments::add(const std::vector<Vec3d>& values) {
-  mean.resize(values.size(), Vec3d(0.0));
-  squares.resize(values.size(), Vec3d(0.0));
+double ErrorEstimate::bound() const {
+  return std::sqrt(noise * noise + bias * bias + doubt * doubt);
+}
+
+void FrameError::Pyramid::add(std::vector<Rgb> values, int width) {
   ++count;
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    const Vec3d before = values[i] - mean[i];
-    mean[i] += before / static_cast<double>(count);
-    squares[i] += before * (values[i] - mean[i]);
+  const int most =
+      std::max(width, width > 0 ? static_cast<int>(values.size()) / width : 0) / kFewestBlocks;
+  for (std::size_t level = 0; level == 0 || 1 << level <= most; ++level) {
+    if (level > 0) {
+      values = halved(values, width);
+      width = (width + 1) / 2;
+    }
+    if (level == levels.size())
+      levels.push_back({width, std::vector<Rgb>(values.size(), Rgb(0.0f)),
+                        std::vector<Rgb>(values.size(), Rgb(0.0f))});
+    Moments& m = levels[level];
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      const Rgb before = values[i] - m.mean[i];
+      m.mean[i] += before / static_cast<float>(count);
+      m.squares[i] += before * (values[i] - m.mean[i]);
+    }
   }
 }
 
-Vec3d FrameError::Moments::varianceOfMean(std::size_t i) const {
+Vec3d FrameError::Pyramid::varianceOfMean(std::size_t level, std::size_t i) const {
   if (count < 2) return Vec3d(0.0);
-  return squares[i] / (static_cast<double>(count) * (count - 1.0));
+  return Vec3d(levels[level].squares[i]) / (count * (count - 1.0));
 }
 
 void FrameError::add(const std::vector<Rgb>& frame) {
-  m_frames.add({frame.begin(), frame.end()});
+  m_frames[static_cast<std::size_t>(batches() % 2)].add(frame, m_width);
 }
 
 void FrameError::add(const std::vector<Rgb>& frame, const std::vector<Rgb>& wider,
                      double widening) {
   add(frame);
-  std::vector<Vec3d> values(frame.size());
+  std::vector<Rgb> values(frame.size());
   for (std::size_t i = 0; i < values.size(); ++i)
-    values[i] = (Vec3d(wider[i]) - Vec3d(frame[i])) / (widening - 1.0);
-  m_bias.add(values);
+    values[i] = (wider[i] - frame[i]) / static_cast<float>(widening - 1.0);
+  m_wider.add(std::move(values), m_width);
 }
 
-// What squared errors are divided by: ref^2 + (0.1 mean ref)^2. The reference is the mean of a
-// pixel and its neighbours: one that a rare bright path hit is bright and noisy at once, and would
-// look better than it is by its own brightness.
-std::vector<Vec3d> FrameError::scales() const {
-  const std::vector<Vec3d>& frame = m_frames.mean;
-  const int height = m_width > 0 ? static_cast<int>(frame.size()) / m_width : 0;
-  std::vector<Vec3d> scale(frame.size());
-  double mean = 0;
-  for (const Vec3d& pixel : frame)
-    mean += sumOf(pixel) / (3.0 * static_cast<double>(frame.size()));
-  for (int y = 0; y < height; ++y)
-    for (int x = 0; x < m_width; ++x) {
-      Vec3d sum(0.0);
-      double count = 0;
-      for (int v = std::max(0, y - 1); v <= std::min(y + 1, height - 1); ++v)
-        for (int u = std::max(0, x - 1); u <= std::min(x + 1, m_width - 1); ++u, ++count)
-          sum += frame[static_cast<std::size_t>(v * m_width + u)];
-      sum /= count;
-      scale[static_cast<std::size_t>(y * m_width + x)] = sum * sum + 0.01 * mean * mean;
+void FrameError::addTruth(const std::vector<Rgb>& frame) {
+  m_truths.add(frame, m_width);
+}
+
+// Both turns of batches as one (Chan et al. 1979).
+FrameError::Pyramid FrameError::allFrames() const {
+  const Pyramid& b = m_frames[1];
+  Pyramid all = m_frames[0];
+  if (b.count == 0) return all;
+  const float n = static_cast<float>(all.count + b.count);
+  const float share = static_cast<float>(b.count) / n;
+  for (std::size_t level = 0; level < all.levels.size(); ++level) {
+    Moments& a = all.levels[level];
+    for (std::size_t i = 0; i < a.mean.size(); ++i) {
+      const Rgb difference = b.levels[level].mean[i] - a.mean[i];
+      a.mean[i] += share * difference;
+      a.squares[i] += b.levels[level].squares[i] +
+                      static_cast<float>(all.count) * share * difference * difference;
     }
-  return scale;
+  }
+  all.count += b.count;
+  return all;
+}
+
+// The best guess at the true frame, and what squared errors are divided by: guess^2 + (0.1 mean)^2.
+struct FrameError::Guess {
+  std::vector<Vec3d> scale;        // by pixel
+  std::vector<Vec3d> blockScales;  // means over the blocks of a level
+  std::vector<double> counts;      // pixels of each
+  double values = 0;               // of the frame: its pixels times three channels
+};
+
+// The frame, moved by what the truths say of each block, softened: noise in what is divided by
+// makes errors look larger.
+FrameError::Guess FrameError::guess(const Pyramid& frames, std::size_t level) const {
+  const std::vector<Rgb>& mean = frames.levels[0].mean;
+  const Moments& blocks = frames.levels[level];
+  std::vector<Vec3d> guess(mean.begin(), mean.end());
+  std::vector<Rgb> correction(blocks.mean.size(), Rgb(0.0f));
+  if (m_truths.count > 0) {
+    for (std::size_t b = 0; b < correction.size(); ++b)
+      correction[b] = m_truths.levels[level].mean[b] - blocks.mean[b];
+    correction = softened(correction, blocks.width);
+  }
+  double average = 0;
+  for (std::size_t i = 0; i < guess.size(); ++i) {
+    guess[i] += Vec3d(correction[blockOf(i, m_width, blocks.width, level)]);
+    average += sumOf(guess[i]) / (3.0 * static_cast<double>(guess.size()));
+  }
+  Guess out;
+  out.values = 3.0 * static_cast<double>(guess.size());
+  out.blockScales.resize(blocks.mean.size(), Vec3d(0.0));
+  out.counts.resize(blocks.mean.size(), 0.0);
+  for (std::size_t i = 0; i < guess.size(); ++i) {
+    out.scale.push_back(guess[i] * guess[i] + 0.01 * average * average);
+    const std::size_t b = blockOf(i, m_width, blocks.width, level);
+    out.blockScales[b] += out.scale[i];
+    ++out.counts[b];
+  }
+  for (std::size_t b = 0; b < out.counts.size(); ++b)
+    out.blockScales[b] /= out.counts[b];
+  return out;
+}
+
+double FrameError::noiseSquared(const Pyramid& frames, const Guess& guess) const {
+  double sum = 0;
+  for (std::size_t i = 0; i < guess.scale.size(); ++i)
+    sum += sumOf(frames.varianceOfMean(0, i) / guess.scale[i]);
+  return sum / guess.values;
+}
+
+// Without truths, each half of the batches is the guess for the other's noise: a pixel that a rare
+// bright path hit is bright and noisy at once, and would hide its noise by its own brightness.
+// Softened as above.
+double FrameError::noiseByHalves() const {
+  const Pyramid &a = m_frames[0], &b = m_frames[1];
+  if (b.count == 0) return 0;
+  const std::vector<Rgb> first = softened(a.levels[0].mean, m_width);
+  const std::vector<Rgb> second = softened(b.levels[0].mean, m_width);
+  const double values = 3.0 * static_cast<double>(first.size());
+  double average = 0;
+  for (std::size_t i = 0; i < first.size(); ++i)
+    average += 0.5 * sumOf(Vec3d(first[i]) + Vec3d(second[i])) / values;
+  if (!(average > 0)) return 0;
+  const double floor = 0.01 * average * average;
+  const auto part = [&](const Pyramid& noisy, const Rgb& guess, std::size_t i) {
+    const Vec3d scale = Vec3d(guess) * Vec3d(guess) + floor;
+    // A half of fewer than two batches has no spread; the other stands for both.
+    return sumOf(Vec3d(noisy.levels[0].squares[i]) / scale) / std::max(1, noisy.count - 1);
+  };
+  double sum = 0;
+  const double halves = (a.count > 1 ? 1.0 : 0.0) + (b.count > 1 ? 1.0 : 0.0);
+  for (std::size_t i = 0; i < first.size(); ++i)
+    sum += part(a, second[i], i) + part(b, first[i], i);
+  return halves > 0 ? sum / halves / values / (a.count + b.count) : 0;
+}
+
+// What the wider kernel says of the bias within blocks: all of it less that of the blocks' means.
+// The square of a noisy mean is too large by its variance.
+double FrameError::widening(const Guess& guess, std::size_t level) const {
+  if (m_wider.count == 0) return 0;
+  const auto squared = [&](std::size_t at, std::size_t i) {
+    const Vec3d mean(m_wider.levels[at].mean[i]);
+    return mean * mean - m_wider.varianceOfMean(at, i);
+  };
+  double sum = 0;
+  for (std::size_t i = 0; i < guess.scale.size(); ++i)
+    sum += sumOf(squared(0, i) / guess.scale[i]);
+  if (m_truths.count > 1)
+    for (std::size_t b = 0; b < guess.counts.size(); ++b)
+      sum -= guess.counts[b] * sumOf(squared(level, b) / guess.blockScales[b]);
+  return std::max(0.0, sum / guess.values);
+}
+
+// The bias of the blocks' means: the squared difference of two noisy means, less its variance. The
+// standard error takes differences for normally distributed, and noise to be common to channels.
+void FrameError::judge(const Pyramid& frames, const Guess& guess, std::size_t level, double& bias,
+                       double& standardError) const {
+  bias = standardError = 0;
+  if (m_truths.count < 2) return;
+  for (std::size_t b = 0; b < guess.counts.size(); ++b) {
+    const Vec3d difference =
+        Vec3d(frames.levels[level].mean[b]) - Vec3d(m_truths.levels[level].mean[b]);
+    const Vec3d variance = frames.varianceOfMean(level, b) + m_truths.varianceOfMean(level, b);
+    const Vec3d squared = difference * difference - variance;
+    bias += guess.counts[b] * sumOf(squared / guess.blockScales[b]);
+    const Vec3d spread =
+        glm::sqrt(2.0 * variance * variance + 4.0 * variance * glm::max(squared, Vec3d(0.0)));
+    standardError += square(guess.counts[b] * sumOf(spread / guess.blockScales[b]));
+  }
+  bias /= guess.values;
+  standardError = std::sqrt(standardError) / guess.values;
 }
 
 ErrorEstimate FrameError::estimate() const {
-  const std::vector<Vec3d> scale = scales();
-  double noise = 0, bias = 0;
-  for (std::size_t i = 0; i < scale.size(); ++i) {
-    if (!(sumOf(scale[i]) > 0)) continue;  // a black frame
-    noise += sumOf(m_frames.varianceOfMean(i) / scale[i]);
-    // The square of a noisy mean is too large by its variance.
-    if (m_bias.count > 0)
-      bias += sumOf((m_bias.mean[i] * m_bias.mean[i] - m_bias.varianceOfMean(i)) / scale[i]);
+  if (batches() == 0 || m_frames[0].levels[0].mean.empty()) return {};
+  ErrorEstimate e;
+  if (m_truths.count < 2) e.noise = std::sqrt(noiseByHalves());
+  if (m_truths.count < 2 && m_wider.count == 0) return e;
+  const Pyramid frames = allFrames();
+  for (std::size_t level = 0; level < frames.levels.size(); ++level) {
+    const Guess reference = guess(frames, level);
+    if (!(sumOf(reference.scale[0]) > 0)) return {};  // black: every scale holds the mean
+    double bias = 0, doubt = 0;
+    judge(frames, reference, level, bias, doubt);
+    const double noise = m_truths.count < 2 ? square(e.noise) : noiseSquared(frames, reference);
+    const double all = std::max(0.0, bias + widening(reference, level));
+    e = {std::sqrt(noise), std::sqrt(all), std::sqrt(doubt), m_truths.count < 2 ? 0 : 1 << level};
+    if (doubt <= kDoubtShare * (noise + all)) break;
   }
-  const double count = 3.0 * static_cast<double>(std::max<std::size_t>(1, scale.size()));
-  return {std::sqrt(noise / count), std::sqrt(std::max(0.0, bias) / count)};
+  return e;
 }
 
 std::vector<Rgb> FrameError::standardError() const {
-  std::vector<Rgb> out(m_frames.mean.size());
+  const Pyramid frames = allFrames();
+  std::vector<Rgb> out(frames.count > 0 ? frames.levels[0].mean.size() : 0);
   for (std::size_t i = 0; i < out.size(); ++i)
-    out[i] = Rgb(glm::sqrt(m_frames.varianceOfMean(i)));
+    out[i] = Rgb(glm::sqrt(frames.varianceOfMean(0, i)));
   return out;
 }
 

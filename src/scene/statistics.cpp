@@ -22,6 +22,7 @@ std::string statsJson(const FrameStatistics& s) {
                      {"trace", s.seconds.trace}, {"resolve", s.seconds.resolve},
                      {"march", s.seconds.march}, {"write", s.seconds.write},
                      {"total", s.seconds.total}};
+  if (s.seconds.check > 0) json["seconds"]["check"] = s.seconds.check;
   json["cpu_seconds"] = s.cpuSeconds;
   json["peak_memory_bytes"] = s.peakMemoryBytes;
   json["photons"] = {{"emitted", s.photonsEmitted},
@@ -39,11 +40,9 @@ std::string statsJson(const FrameStatistics& s) {
   if (s.pathsCapped > 0)
     json["paths_capped"] = {{"count", s.pathsCapped}, {"throughput", s.pathsCappedRadiance}};
   if (s.error)
-    json["error"] = {{"estimate", s.error->total()},
-                     {"noise", s.error->noise},
-                     {"bias", s.error->bias},
-                     {"batches", s.batches},
-                     {"target_missed", s.targetMissed}};
+    json["error"] = {{"estimate", s.error->total()}, {"noise", s.error->noise},
+                     {"bias", s.error->bias},        {"doubt", s.error->doubt},
+                     {"batches", s.batches},         {"target_missed", s.targetMissed}};
   if (s.clampedLight > 0) json["clamped_light"] = s.clampedLight;
   json["effects"] = nlohmann::ordered_json::object();
   for (const EffectState& effect : s.effects)

@@ -196,12 +196,17 @@ Verdict verdictOf(const SweepResult& sweep, std::size_t layer) {
   verdict.ourError = ours.error;
   verdict.rivalError = rival.error;
   verdict.known = true;
-  for (const Curve& curve : curves)
-    if (curve.family == "path_traced") {
-      const CurvePoint& last = curve.points.back();
-      verdict.pathSeconds = last.seconds * std::pow(last.error / ours.error, 2);
-    }
+  verdict.pathSeconds = pathSecondsFor(curves, ours.error);
   return verdict;
+}
+
+double pathSecondsFor(const std::vector<Curve>& curves, double error) {
+  for (const Curve& curve : curves)
+    if (curve.family == "path_traced" && error > 0) {
+      const CurvePoint& last = curve.points.back();
+      return last.seconds * std::pow(last.error / error, 2);
+    }
+  return 0;
 }
 
 std::vector<std::string> advice(const StudyResult& result) {

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "curves.h"
 #include "photosphere/study/result.h"
 
 namespace photosphere::study {
@@ -16,12 +17,14 @@ struct Verdict {
   double seconds = 0;       ///< at which both are compared
   std::string ours, rival;  ///< titles of the best of each
   double ourError = 0, rivalError = 0;
-  /// Until path tracing has our error, its squared error falling as 1 / time from its last point;
-  /// 0 where it was not measured.
-  double pathSeconds = 0;
-  bool known = false;  ///< false where there is nothing to compare
+  double pathSeconds = 0;  ///< until path tracing has our error; pathSecondsFor
+  bool known = false;      ///< false where there is nothing to compare
 };
 /// Compared at the time of the slowest photosphere point of the sweep, over all pixels.
 Verdict verdictOf(const SweepResult& sweep, std::size_t layer);
+
+/// Until path tracing has this relative error [s], its squared error falling as 1 / time from its
+/// last point; 0 where it was not measured.
+double pathSecondsFor(const std::vector<Curve>& curves, double error);
 
 }  // namespace photosphere::study

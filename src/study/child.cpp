@@ -115,11 +115,17 @@ std::string renderWork(const RenderJob& job) {
   const scene::FrameResult frame = scene::renderScene(job.scene, job.frame, job.request);
   const scene::FrameStatistics& s = frame.statistics;
   image::writeExr(job.image, judgedLayers(frame));
-  return json{{"read", s.seconds.read},    {"rasterize", s.seconds.rasterize},
-              {"trace", s.seconds.trace},  {"resolve", s.seconds.resolve},
-              {"march", s.seconds.march},  {"total", s.seconds.total},
-              {"cpu", s.cpuSeconds},       {"memory", s.peakMemoryBytes},
-              {"stored", s.photonsStored}, {"capped", s.pathsCapped}}
+  return json{{"read", s.seconds.read},
+              {"rasterize", s.seconds.rasterize},
+              {"trace", s.seconds.trace},
+              {"resolve", s.seconds.resolve},
+              {"march", s.seconds.march},
+              {"total", s.seconds.total},
+              {"cpu", s.cpuSeconds},
+              {"memory", s.peakMemoryBytes},
+              {"stored", s.photonsStored},
+              {"capped", s.pathsCapped},
+              {"error", s.error ? s.error->total() : 0.0}}
       .dump();
 }
 
@@ -189,6 +195,7 @@ RenderOutcome renderInChild(const RenderJob& job) {
   outcome.peakMemoryBytes = values.at("memory");
   outcome.photonsStored = values.at("stored");
   outcome.pathsCapped = values.at("capped");
+  outcome.estimatedError = values.at("error");
   return outcome;
 }
 

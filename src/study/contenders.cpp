@@ -40,6 +40,10 @@ const std::vector<Family>& families() {
        "photon map, 8 progressive passes",
        {"estimator.type=photon_map", "estimator.passes=8"}},
       {"path_traced", "path tracing", {"estimator.type=path_traced"}, Work::samples},
+      {"until_error",
+       "photosphere, view, until its estimated error",
+       {"estimator.basis=view", "estimator.photons=200000", "render.time_limit=60"},
+       Work::errorTarget},
       {"single", "single scattering alone", {"estimator.type=single"}, Work::none},
   };
   return table;
@@ -54,18 +58,24 @@ std::string familyTitle(const std::string& name) {
 SweepSize SweepSize::full() {
   return {{16'000, 64'000, 256'000, 1'024'000, 4'096'000, 16'384'000},
           {4, 16, 64, 256, 1024, 4096},
+          {10, 20, 40},
           {}};
 }
 
 SweepSize SweepSize::quick() {
-  return {{1'000, 4'000}, {1, 4}, {"view", "histogram_32", "path_traced", "single"}};
+  return {{1'000, 4'000},
+          {1, 4},
+          {2},
+          {"view", "histogram_32", "path_traced", "until_error", "single"}};
 }
 
 SweepSize SweepSize::hardCase(bool quick) {
   SweepSize size{{64'000, 1'024'000},
                  {16, 256},
-                 {"view", "histogram_32", "particles_view", "photon_map", "path_traced", "single"}};
-  if (quick) size = {{1'000}, {2}, {"view", "path_traced"}};
+                 {10, 20},
+                 {"view", "histogram_32", "particles_view", "photon_map", "path_traced",
+                  "until_error", "single"}};
+  if (quick) size = {{1'000}, {2}, {2}, {"view", "path_traced", "until_error"}};
   return size;
 }
 
@@ -104,8 +114,25 @@ Contender contender(const Family& family, int level, std::int64_t work) {
   } else if (family.work == Work::samples) {
     c.sets.push_back(fmt::format("estimator.samples={}", work));
     c.label += fmt::format(", {} samples a pixel", work);
+  } else if (family.work == Work::errorTarget) {
+    c.sets.push_back(fmt::format("render.target_error={}", 1.0 / static_cast<double>(work)));
+    c.label += fmt::format(" is {:.3g} %", 100.0 / static_cast<double>(work));
   }
   return c;
+}
+
+std::vector<std::int64_t> worksOf(Work work, const SweepSize& size) {
+  switch (work) {
+    case Work::photons:
+      return size.photons;
+    case Work::samples:
+      return size.samples;
+    case Work::errorTarget:
+      return size.targets;
+    case Work::none:
+      break;
+  }
+  return {0};
 }
 
 // The scene refuses what it does not serve, or why it does.
@@ -132,9 +159,7 @@ std::vector<Contender> contenders(const SceneSource& scene, const SweepSize& siz
         size.families.empty() ||
         std::find(size.families.begin(), size.families.end(), family.name) != size.families.end();
     if (!wanted) continue;
-    const std::vector<std::int64_t> works = family.work == Work::photons   ? size.photons
-                                            : family.work == Work::samples ? size.samples
-                                                                           : std::vector{0L};
+    const std::vector<std::int64_t> works = worksOf(family.work, size);
     for (std::size_t level = 0; level < works.size(); ++level) {
       Contender c = contender(family, static_cast<int>(level), works[level]);
       if (family.needsParticles)

@@ -12,7 +12,7 @@
 namespace photosphere::study {
 
 /// What makes one contender of a family better and slower.
-enum class Work { photons, samples, none };
+enum class Work { photons, samples, errorTarget, none };
 
 /// Settings that are swept together. An estimator or option that this version does not serve drops
 /// out by itself: the scene refuses it.
@@ -32,15 +32,15 @@ std::string familyTitle(const std::string& name);
 struct Contender {
   const Family* family = nullptr;
   int level = 0;
-  std::int64_t work = 0;  ///< photons or samples a pixel
+  std::int64_t work = 0;  ///< photons, samples a pixel, or 1 over the relative error asked for
   std::vector<std::string> sets;
   std::string label;  ///< "photosphere, 32 bins, 256k photons"
 };
 
 /// How far a sweep goes.
 struct SweepSize {
-  std::vector<std::int64_t> photons, samples;  ///< of the levels
-  std::vector<std::string> families;           ///< names; empty = all
+  std::vector<std::int64_t> photons, samples, targets;  ///< of the levels
+  std::vector<std::string> families;                    ///< names; empty = all
 
   static SweepSize full();
   static SweepSize quick();

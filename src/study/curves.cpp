@@ -108,6 +108,8 @@ std::vector<Curve> curvesOf(const SweepResult& sweep, std::size_t layer, std::si
   for (const PointResult& p : sweep.points) {
     // Single scattering alone says nothing of the other: black is no estimate of it.
     if (layer == kMultiple && p.family == "single") continue;
+    // It also renders what it judges itself by, and has a table of its own.
+    if (p.family == "until_error") continue;
     auto found = std::find_if(curves.begin(), curves.end(),
                               [&](const Curve& c) { return c.family == p.family; });
     if (found == curves.end())

@@ -33,6 +33,7 @@ class FlickerMeter {
       : m_plan(plan), m_leftOut(leftOut) {
     SweepSize size{{plan.quick ? 1'000 : 64'000},
                    {plan.quick ? 2 : 16},
+                   {},
                    {"view", "histogram_32", "particles_view", "photon_map", "path_traced"}};
     if (plan.quick) size.families = {"view", "path_traced"};
     std::vector<LeftOut> refused;  // the main sweep has reported them

@@ -159,6 +159,15 @@ std::string page(const StudyResult& result, const PictureSettings& settings) {
   body += heading(2, "Time and memory") + tableTag(pointTable(main));
   body += heading(2, "Bias and variance") + errorTables(main);
   body += hardCases(result, settings);
+  if (const Table table = estimateTable(result); table.rows.size() > 1)
+    body += heading(2, "How true the estimate of a frame's error is") +
+            paragraph(
+                "render --target-error goes on until the error that a frame estimates of itself, "
+                "plus what the estimate leaves in doubt, is below the one asked for: noise from "
+                "independent parts of the frame, bias from path traced means over blocks of it "
+                "and, within blocks, from a wider kernel. The noise of the reference is taken off "
+                "what was measured.") +
+            tableTag(table);
   if (!result.flicker.empty())
     body += heading(2, "Flicker") +
             paragraph(

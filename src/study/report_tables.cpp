@@ -153,6 +153,30 @@ Table hardCaseTable(const StudyResult& result) {
   return table;
 }
 
+Table estimateTable(const StudyResult& result) {
+  Table table;
+  table.caption =
+      "Relative error of layer total over all pixels, as frames that were asked for one estimate "
+      "it "
+      "of themselves (median and range over the seeds) and as the reference tells it";
+  table.firstNumber = 1;
+  table.rows.push_back({"scene", "asked for", "estimated", "measured", "estimated over measured",
+                        "time [s]", "path tracing alone [s]"});
+  for (const SweepResult& sweep : result.sweeps) {
+    const std::vector<Curve> curves = curvesOf(sweep, kTotal, kAllPixels);
+    for (const PointResult& p : sweep.points) {
+      if (!(p.estimatedError.median > 0)) continue;
+      const double measured = relativeError(p.errors[kTotal][kAllPixels]);
+      table.rows.push_back(
+          {sweep.name, fmt::format("{:.3g}", 1.0 / static_cast<double>(p.work)),
+           spread(p.estimatedError), fmt::format("{:.3g}", measured),
+           measured > 0 ? fmt::format("{:.3g}", p.estimatedError.median / measured) : "\u2013",
+           seconds(p.seconds.total.median), seconds(pathSecondsFor(curves, measured))});
+    }
+  }
+  return table;
+}
+
 Table flickerTable(const StudyResult& result) {
   Table table;
   table.caption =

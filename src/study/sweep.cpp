@@ -281,6 +281,8 @@ PointResult Sweep::evaluate(const Entry& entry,
   point.peakMemoryBytes =
       spreadOver(entry.runs, [](const RenderOutcome& r) { return r.peakMemoryBytes; });
   point.photonsStored = entry.runs.front().photonsStored;
+  point.estimatedError =
+      spreadOver(entry.runs, [](const RenderOutcome& r) { return r.estimatedError; });
   std::vector<image::Image> frames;
   for (const fs::path& path : entry.images)
     frames.push_back(image::readExr(path).image);

@@ -58,6 +58,7 @@ Json toJson(const PointResult& p) {
           {"cpu_seconds", toJson(p.cpuSeconds)},
           {"peak_memory_bytes", toJson(p.peakMemoryBytes)},
           {"photons_stored", p.photonsStored},
+          {"estimated_error", toJson(p.estimatedError)},
           {"errors", std::move(errors)}};
 }
 
@@ -105,7 +106,8 @@ constexpr const char* kHeader =
     "variance,variance_low95,variance_high95,mean_ratio,mean_ratio_low95,mean_ratio_high95,"
     "reference_noise_subtracted,read_s,rasterize_s,trace_s,resolve_s,march_s,"
     "total_s,total_min_s,total_max_s,cpu_s,cpu_min_s,cpu_max_s,"
-    "peak_memory_bytes,peak_memory_min_bytes,peak_memory_max_bytes,photons_stored\r\n";
+    "peak_memory_bytes,peak_memory_min_bytes,peak_memory_max_bytes,photons_stored,"
+    "estimated_error,estimated_error_min,estimated_error_max\r\n";
 
 void addRows(std::string& text, const SweepResult& sweep, const PointResult& p) {
   const StageSpreads& s = p.seconds;
@@ -119,8 +121,8 @@ void addRows(std::string& text, const SweepResult& sweep, const PointResult& p) 
                           cells(f.variance), cells(f.meanRatio), cell(f.referenceNoise));
       text += fmt::format("{},{},{},{},{},", cell(s.read.median), cell(s.rasterize.median),
                           cell(s.trace.median), cell(s.resolve.median), cell(s.march.median));
-      text += fmt::format("{},{},{},{}\r\n", cells(s.total), cells(p.cpuSeconds),
-                          cells(p.peakMemoryBytes), p.photonsStored);
+      text += fmt::format("{},{},{},{},{}\r\n", cells(s.total), cells(p.cpuSeconds),
+                          cells(p.peakMemoryBytes), p.photonsStored, cells(p.estimatedError));
     }
 }
 

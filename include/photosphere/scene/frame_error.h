@@ -1,22 +1,33 @@
 #pragma once
 // How far a frame is from the truth, estimated from independent batches of it.
 
+#include <array>
 #include <vector>
 
 #include "photosphere/core/types.h"
 
 namespace photosphere::scene {
 
-/// Relative errors, sqrt(relMSE) of METHOD.md section 7 with the frame's own best guess as
-/// reference.
+/// Relative errors, sqrt(relMSE) of METHOD.md section 7 with a best guess as reference.
 struct ErrorEstimate {
   double noise = 0;  ///< of the mean of the batches, from their spread
-  double bias = 0;   ///< from what a wider kernel changes; 0 where there is no kernel
+  double bias = 0;   ///< what more batches do not mend
+  double doubt = 0;  ///< one standard error of the squared bias, as its root: a bias of about this
+                     ///< size can have been overlooked
+  int block = 0;     ///< edge of the blocks that the bias was told by [pixels]; 0 = not told
+  /// The estimate.
   double total() const;
+  /// What the estimate is after one standard error of the bias; a target is met when this is.
+  double bound() const;
 };
 
 /// Adds up batches of one frame. Photon noise is shared by neighbouring pixels and samples, so only
 /// whole batches with photons of their own tell it.
+///
+/// A bias is told in two parts that add up. Means over square blocks of pixels are held against
+/// those of unbiased frames, so that any cause of a bias counts, known or not: path tracing is
+/// noisy pixel by pixel and far less so block by block. What stays within a block is told by a
+/// wider kernel. The blocks are the smallest that the unbiased frames at hand tell anything about.
 class FrameError {
  public:
   /// @param width  of the frame [pixels]
@@ -27,26 +38,43 @@ class FrameError {
   /// taken to be in proportion to the width, as it is at the smoke's edge, where most of it sits;
   /// inside, where it is of second order, that is too much rather than too little.
   void add(const std::vector<Rgb>& frame, const std::vector<Rgb>& wider, double widening);
+  /// An unbiased frame, independent of all batches and of the other truths.
+  void addTruth(const std::vector<Rgb>& frame);
 
-  int batches() const { return m_frames.count; }
-  /// Zero noise before the second batch.
+  int batches() const { return m_frames[0].count + m_frames[1].count; }
+  int truths() const { return m_truths.count; }
+  /// Zero noise before the second batch; no bias before the second truth, unless by a wider kernel.
   ErrorEstimate estimate() const;
   /// Standard error of the mean, pixel by pixel and channel by channel [W m^-2 sr^-1].
   std::vector<Rgb> standardError() const;
 
  private:
-  // Mean and sum of squared deviations (Welford 1962).
+  // Mean and sum of squared deviations (Welford 1962) of the pixels of one size.
   struct Moments {
-    std::vector<Vec3d> mean, squares;
-    int count = 0;
-    void add(const std::vector<Vec3d>& values);
-    Vec3d varianceOfMean(std::size_t i) const;
+    int width = 0;
+    std::vector<Rgb> mean, squares;
+    int height() const { return width > 0 ? static_cast<int>(mean.size()) / width : 0; }
   };
+  // The same for the frame, for blocks of 2 x 2 pixels, of 4 x 4, and so on.
+  struct Pyramid {
+    std::vector<Moments> levels;
+    int count = 0;
+    void add(std::vector<Rgb> values, int width);
+    Vec3d varianceOfMean(std::size_t level, std::size_t i) const;
+  };
+  struct Guess;
 
-  std::vector<Vec3d> scales() const;
+  Pyramid allFrames() const;
+  double noiseByHalves() const;
+  Guess guess(const Pyramid& frames, std::size_t level) const;
+  double noiseSquared(const Pyramid& frames, const Guess& guess) const;
+  double widening(const Guess& guess, std::size_t level) const;
+  void judge(const Pyramid& frames, const Guess& guess, std::size_t level, double& bias,
+             double& standardError) const;
 
   int m_width;
-  Moments m_frames, m_bias;
+  std::array<Pyramid, 2> m_frames;  // batches in turn
+  Pyramid m_wider, m_truths;
 };
 
 }  // namespace photosphere::scene

@@ -27,6 +27,7 @@ struct RenderRequest {
 /// Wall-clock seconds of each stage.
 struct StageSeconds {
   double read = 0, rasterize = 0, trace = 0, resolve = 0, march = 0, write = 0, total = 0;
+  double check = 0;  ///< paths that a frame with a target error is held against
 };
 
 /// What --stats and the EXR header report.

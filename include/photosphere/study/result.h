@@ -56,14 +56,15 @@ struct PointResult {
   std::string family;     ///< such as "view"
   std::string label;      ///< such as "view, 250k photons"
   std::string settings;   ///< overrides of the scene, `key=value; key=value`
-  std::int64_t work = 0;  ///< photons emitted or samples a pixel
+  std::int64_t work = 0;  ///< photons emitted, samples a pixel, or 1 over the error asked for
   int seeds = 0;
   StageSpreads seconds;
   Spread cpuSeconds;
   Spread peakMemoryBytes;  ///< of a process that rendered this alone
   std::uint64_t photonsStored = 0;
   LayerFigures errors;
-  image::Image frame;  ///< R, G, B of the first seed; of a family's most work alone
+  Spread estimatedError;  ///< that the frames give of themselves, layer total; 0 without
+  image::Image frame;     ///< R, G, B of the first seed; of a family's most work alone
 };
 
 struct LeftOut {
