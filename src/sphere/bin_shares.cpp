@@ -136,8 +136,8 @@ void BinShares::findCandidates() {
   for (int cell = 0; cell < cells; ++cell) {
     auto& list = m_candidates[static_cast<std::size_t>(cell)];
     for (int i = 0; i < side * side; ++i) {
-      const Vec2d u(static_cast<double>(i % side) / (side - 1),
-                    static_cast<double>(i / side) / (side - 1));
+      const int column = i % side, row = i / side;
+      const Vec2d u = Vec2d(column, row) / (side - 1.0);
       const Vec3f w = glm::abs(m_partition.point(cell, u));
       const bool known = std::any_of(list.begin(), list.end(), [&](std::uint32_t f) {
         return std::any_of(m_faces[f].triangles.begin(), m_faces[f].triangles.end(),

@@ -179,8 +179,8 @@ std::optional<ReferenceImage> readReference(const fs::path& path, const std::str
   return reference;
 }
 
-ReferenceMaker::ReferenceMaker(scene::SceneFile pathTraced, std::int64_t frame, std::string name,
-                               std::string key, fs::path folder, int chunk)
+ReferenceMaker::ReferenceMaker(scene::SceneFile pathTraced, std::int64_t frame,
+                               const std::string& name, std::string key, fs::path folder, int chunk)
     : m_scene(std::move(pathTraced)),
       m_frame(frame),
       m_key(std::move(key)),

@@ -50,8 +50,8 @@ class ReferenceMaker {
   /// key.
   /// @param name    begins the file's name; letters, digits, - and _ of it are kept
   /// @param chunk   paths a pixel of each half of a pair
-  ReferenceMaker(scene::SceneFile pathTraced, std::int64_t frame, std::string name, std::string key,
-                 std::filesystem::path folder, int chunk);
+  ReferenceMaker(scene::SceneFile pathTraced, std::int64_t frame, const std::string& name,
+                 std::string key, std::filesystem::path folder, int chunk);
 
   const ReferenceImage& image() const { return m_image; }
   const std::string& key() const { return m_key; }
