@@ -38,6 +38,9 @@ void checkLayout(const LightFieldLayout& l) {
          "carriers hold no energy to share out");
   refuse(l.merge == Merge::sampled && !particles,
          "merge = \"sampled\" draws one bin of each particle: it needs carrier = \"particles\"");
+  refuse(l.smoothing != Smoothing::twicing && (particles || l.evaluate == Evaluate::perStep),
+         "'smoothing' other than \"twicing\" is of fluence on voxels, once for each view: it needs "
+         "carrier = \"voxels\" and evaluate = \"per_view\"");
   if (l.basis == Basis::view) {
     refuse(l.evaluate != Evaluate::perView,
            "evaluate = \"per_step\" reads directions at every step, and basis = \"view\" keeps "
@@ -52,14 +55,14 @@ void checkLayout(const LightFieldLayout& l) {
     refuse(l.representative != Representative::bin,
            "'representative' is a bin's direction: it needs basis = \"histogram\"");
     refuse(l.merge != Merge::full, "'merge' joins bins: it needs basis = \"histogram\"");
-    if (smooths) l.smoothing();
+    if (smooths) l.directionKernel();
     return;
   }
   refuse(
       l.direction == sphere::DirectionDeposit::kernel && !smooths,
       "direction = \"kernel\" spreads a photon over bins by 'kernel': choose \"epanechnikov\" or "
       "\"gaussian\" for it");
-  l.smoothing();  // bandwidth and truncation make a kernel
+  l.directionKernel();  // bandwidth and truncation make a kernel
   if (l.merge == Merge::sampled && l.evaluate == Evaluate::perStep) checkDirections(l.directions);
 }
 

@@ -25,7 +25,7 @@ PhaseReader::PhaseReader(const LightFieldLayout& layout, const transport::Medium
   // Smoothing the light is smoothing the phase function: both convolve with the kernel.
   sphere::LegendreMoments moments = sphere::phaseMoments(plain);
   if (smooths)
-    moments = sphere::convolved(moments, sphere::kernelMoments(layout.smoothing(), moments.size()));
+    moments = sphere::convolved(moments, sphere::kernelMoments(layout.directionKernel(), moments.size()));
   if (layout.basis == Basis::sphericalHarmonics) {
     // Convolving with a function of the angle scales degree l by its moment (Funk & Hecke): exact
     // up to the order, at the moments' own length zero.
@@ -54,7 +54,7 @@ void PhaseReader::restore(const sphere::BinWeights::Phase&) {
   const sphere::Partition bins(m_layout.rows), cells(rows);
   const bool smooths = m_layout.direction != sphere::DirectionDeposit::kernel;
   for (const double share : sphere::smoothingMatrix(
-           bins, cells, smooths ? m_layout.smoothing() : sphere::SmoothingKernel()))
+           bins, cells, smooths ? m_layout.directionKernel() : sphere::SmoothingKernel()))
     m_restored.push_back(static_cast<float>(share));
   for (int k = 0; k < cells.size(); ++k)
     m_directions.push_back(cells.center(k));

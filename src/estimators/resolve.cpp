@@ -108,8 +108,7 @@ class ResolvedField final : public InscatterSource {
         m_clamped.count(folded);
         m_fields[set * phases + k] =
             layOut(lattice, gather ? spreadParticles(field, lattice, *gather, folded)
-                                   : sharpened(smoothVoxels(lattice, folded, field.layout.kernel,
-                                                            field.layout.radius)));
+                                   : smoothFluence(medium, lattice, folded, field.layout));
       }
     }
   }

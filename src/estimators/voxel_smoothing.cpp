@@ -85,6 +85,53 @@ Colours sharpened(const Smoothed& smoothed) {
   return out;
 }
 
+namespace {
+
+// Mean extinction of a voxel, from a point in the middle of each eighth [1/m].
+float meanExtinction(const transport::Medium& medium, const SupportLattice& lattice,
+                     std::size_t i) {
+  const Vec3f center = lattice.center(i);
+  const auto quarter = static_cast<float>(0.25 * lattice.edge());
+  float sum = 0.0f;
+  for (int corner = 0; corner < 8; ++corner)
+    sum += medium.extinction(
+        center + quarter * Vec3f(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1));
+  return sum / 8.0f;
+}
+
+// K[sigma_t phi] / K[sigma_t]; plain means where the kernel meets no smoke.
+Colours densityWeighted(const transport::Medium& medium, const SupportLattice& lattice,
+                        const Colours& colours, const std::vector<Tap>& taps,
+                        const Colours& plain) {
+  Colours weighted(colours.size());
+  parallelFor(weighted.size(), 512, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const float weight = meanExtinction(medium, lattice, i);
+      weighted[i] = Vec4f(weight * Vec3f(colours[i]), weight);
+    }
+  });
+  weighted = convolve(lattice, weighted, taps);
+  for (std::size_t i = 0; i < weighted.size(); ++i)
+    weighted[i] = weighted[i].w > 0.0f ? Vec4f(Vec3f(weighted[i]) / weighted[i].w, 0.0f) : plain[i];
+  return weighted;
+}
+
+}  // namespace
+
+Colours smoothFluence(const transport::Medium& medium, const SupportLattice& lattice,
+                      const Colours& colours, const LightFieldLayout& layout) {
+  if (layout.smoothing == Smoothing::twicing)
+    return sharpened(smoothVoxels(lattice, colours, layout.kernel, layout.radius));
+  const std::vector<Tap> taps = kernelTaps(layout.kernel, layout.radius / lattice.edge());
+  const Colours plain = convolve(lattice, colours, taps);
+  if (layout.smoothing == Smoothing::plain) return plain;
+  Colours weighted = densityWeighted(medium, lattice, colours, taps, plain);
+  if (layout.smoothing == Smoothing::mean)
+    for (std::size_t i = 0; i < weighted.size(); ++i)
+      weighted[i] = 0.5f * (weighted[i] + plain[i]);
+  return weighted;
+}
+
 void fillUnreached(const transport::SupportLattice& lattice, Colours& colours,
                    std::vector<std::uint8_t>& reached) {
   while (true) {

@@ -26,6 +26,10 @@ Smoothed smoothVoxels(const transport::SupportLattice& lattice, const Colours& c
 /// kernel and interpolation falls from second to fourth order in their width. Light stays >= 0.
 Colours sharpened(const Smoothed& smoothed);
 
+/// Fluence of a lattice as the layout smooths it.
+Colours smoothFluence(const transport::Medium& medium, const transport::SupportLattice& lattice,
+                      const Colours& colours, const LightFieldLayout& layout);
+
 /// Gives voxels that no particle reached the mean of their neighbours, ring by ring.
 void fillUnreached(const transport::SupportLattice& lattice, Colours& colours,
                    std::vector<std::uint8_t>& reached);

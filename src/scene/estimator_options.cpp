@@ -62,6 +62,7 @@ LightFieldLayout layoutOf(const ParamValues& e, bool lightCache) {
   l.deposit = choice<Deposit>(e, "deposit");
   l.energy = choice<EnergyRule>(e, "energy");
   l.kernel = choice<SpatialKernel>(e, "spatial_kernel");
+  l.smoothing = choice<Smoothing>(e, "smoothing");
   l.direction = choice<sphere::DirectionDeposit>(e, "direction");
   l.representative = choice<Representative>(e, "representative");
   l.merge = choice<Merge>(e, "merge");
@@ -139,6 +140,7 @@ std::string describeLayout(const LightFieldLayout& l) {
   std::string text = fmt::format("{}, {}, {}, {} channel{}", nameOf(l.carrier), basis,
                                  nameOf(l.deposit), l.channels, l.channels == 1 ? "" : "s");
   if (l.holdsPower()) text += fmt::format(", {}", nameOf(l.energy));
+  if (l.smoothing != Smoothing::twicing) text += fmt::format(", smoothing {}", nameOf(l.smoothing));
   if (l.direction != sphere::DirectionDeposit::nearest)
     text += fmt::format(", direction {}", nameOf(l.direction));
   if (l.representative != Representative::bin)

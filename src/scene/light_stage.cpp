@@ -56,6 +56,7 @@ estimators::LightField readField(const SceneFile& scene, bool allowStale, FrameS
   // How light is read is the scene's to say; kernel and bandwidth were used up where they spread
   // it.
   estimators::LightFieldLayout& layout = field.layout;
+  layout.smoothing = setup.layout.smoothing;
   layout.merge = setup.layout.merge;
   layout.evaluate = setup.layout.evaluate;
   layout.directions = setup.layout.directions;

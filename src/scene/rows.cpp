@@ -167,6 +167,13 @@ std::span<const Param> estimatorParams() {
        .defaultText = "epanechnikov",
        .help = "weight over distance; gaussian is cut at 3 sigma = radius",
        .choices = "epanechnikov|box|gaussian"},
+      {.name = "smoothing",
+       .type = ParamType::text,
+       .unit = "",
+       .defaultText = "twicing",
+       .help = "of fluence on voxels: sharpened by a second blur, plain, weighted by density, or "
+               "the mean of plain and density",
+       .choices = "twicing|plain|density|mean"},
       {.name = "carrier",
        .type = ParamType::text,
        .unit = "",

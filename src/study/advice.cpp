@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "contenders.h"
 #include "curves.h"
 #include "photosphere/core/resources.h"
 
@@ -209,6 +210,33 @@ double pathSecondsFor(const std::vector<Curve>& curves, double error) {
   return 0;
 }
 
+namespace {
+
+// Which basis a light cache should hold, by g.
+void addBases(const StudyResult& result, std::vector<std::string>& out) {
+  std::string parts;
+  for (const SweepResult& sweep : result.bases) {
+    const PointResult *best = nullptr, *view = nullptr;
+    const auto error = [](const PointResult& p) {
+      return relativeError(p.errors[kMultiple][kAllPixels]);
+    };
+    for (const PointResult& p : sweep.points) {
+      if (p.family == "view") view = &p;
+      if (p.family == "view" || p.lightMemoryBytes == 0) continue;
+      if (!best || error(p) < error(*best)) best = &p;
+    }
+    if (!best || !view) continue;
+    parts += fmt::format("{}{}: {} ({}; view {})", parts.empty() ? "" : "; ", sweep.name,
+                         familyTitle(best->family), percent(error(*best)), percent(error(*view)));
+  }
+  if (!parts.empty())
+    out.push_back(
+        "Of the bases that a light cache can hold, the least error at equal photons has " + parts +
+        ".");
+}
+
+}  // namespace
+
 std::vector<std::string> advice(const StudyResult& result) {
   std::vector<std::string> out;
   if (result.sweeps.empty()) return out;
@@ -219,6 +247,7 @@ std::vector<std::string> advice(const StudyResult& result) {
   addBiasFloor(sweep, curves, out);
   addMemory(sweep, out);
   addHardCases(result, out);
+  addBases(result, out);
   addFlicker(result, out);
   addReferenceChecks(result, out);
   return out;

@@ -115,17 +115,12 @@ std::string renderWork(const RenderJob& job) {
   const scene::FrameResult frame = scene::renderScene(job.scene, job.frame, job.request);
   const scene::FrameStatistics& s = frame.statistics;
   image::writeExr(job.image, judgedLayers(frame));
-  return json{{"read", s.seconds.read},
-              {"rasterize", s.seconds.rasterize},
-              {"trace", s.seconds.trace},
-              {"resolve", s.seconds.resolve},
-              {"march", s.seconds.march},
-              {"total", s.seconds.total},
-              {"cpu", s.cpuSeconds},
-              {"memory", s.peakMemoryBytes},
-              {"stored", s.photonsStored},
-              {"capped", s.pathsCapped},
-              {"error", s.error ? s.error->total() : 0.0}}
+  return json{{"read", s.seconds.read},      {"rasterize", s.seconds.rasterize},
+              {"trace", s.seconds.trace},    {"resolve", s.seconds.resolve},
+              {"march", s.seconds.march},    {"total", s.seconds.total},
+              {"cpu", s.cpuSeconds},         {"memory", s.peakMemoryBytes},
+              {"stored", s.photonsStored},   {"capped", s.pathsCapped},
+              {"light", s.lightMemoryBytes}, {"error", s.error ? s.error->total() : 0.0}}
       .dump();
 }
 
@@ -195,6 +190,7 @@ RenderOutcome renderInChild(const RenderJob& job) {
   outcome.peakMemoryBytes = values.at("memory");
   outcome.photonsStored = values.at("stored");
   outcome.pathsCapped = values.at("capped");
+  outcome.lightMemoryBytes = values.at("light");
   outcome.estimatedError = values.at("error");
   return outcome;
 }

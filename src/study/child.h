@@ -42,7 +42,8 @@ struct RenderOutcome {
   scene::StageSeconds seconds;
   double cpuSeconds = 0;
   std::uint64_t peakMemoryBytes = 0, photonsStored = 0, pathsCapped = 0;
-  double estimatedError = 0;  ///< where the scene has a target error
+  std::uint64_t lightMemoryBytes = 0;  ///< of the light field or photon map
+  double estimatedError = 0;           ///< where the scene has a target error
 };
 
 /// Renders and leaves layers `total`, `multiple` and `transmittance` (each R, G, B, kind data;

@@ -8,17 +8,39 @@
 
 namespace photosphere::study {
 
+namespace {
+
+Family basisOnly(std::string_view name, std::string_view title, std::string_view basis,
+                 std::vector<std::string> sets) {
+  sets.insert(sets.begin(), fmt::format("estimator.basis={}", basis));
+  return {name, title, std::move(sets), Work::photons, false, true};
+}
+
+}  // namespace
+
 const std::vector<Family>& families() {
   static const std::vector<Family> table = {
       {"view", "photosphere, view", {"estimator.basis=view"}},
       {"view_fine",
        "photosphere, view, fine light voxels",
        {"estimator.basis=view", "estimator.light_voxel=1"}},
+      {"view_mean",
+       "photosphere, view, mean of plain and density-weighted smoothing",
+       {"estimator.basis=view", "estimator.smoothing=mean"}},
       {"histogram_32", "photosphere, 32 bins", {"estimator.basis=histogram", "estimator.rows=2"}},
       {"histogram_128", "photosphere, 128 bins", {"estimator.basis=histogram", "estimator.rows=4"}},
       {"harmonics",
        "photosphere, harmonics of order 4",
        {"estimator.basis=spherical_harmonics", "estimator.order=4"}},
+      basisOnly("histogram_8_means", "photosphere, 8 bins and their mean directions", "histogram",
+                {"estimator.rows=1", "estimator.representative=mean"}),
+      basisOnly("histogram_32_means", "photosphere, 32 bins and their mean directions", "histogram",
+                {"estimator.rows=2", "estimator.representative=mean"}),
+      basisOnly("histogram_512", "photosphere, 512 bins", "histogram", {"estimator.rows=8"}),
+      basisOnly("harmonics_2", "photosphere, harmonics of order 2", "spherical_harmonics",
+                {"estimator.order=2"}),
+      basisOnly("harmonics_8", "photosphere, harmonics of order 8", "spherical_harmonics",
+                {"estimator.order=8"}),
       {"particles_view",
        "photosphere on particles, view",
        {"estimator.carrier=particles", "estimator.basis=view"},
@@ -76,6 +98,17 @@ SweepSize SweepSize::hardCase(bool quick) {
                  {"view", "histogram_32", "particles_view", "photon_map", "path_traced",
                   "until_error", "single"}};
   if (quick) size = {{1'000}, {2}, {2}, {"view", "path_traced", "until_error"}};
+  return size;
+}
+
+SweepSize SweepSize::bases(bool quick) {
+  SweepSize size{{1'024'000}, {64}, {}, {"view", "path_traced"}};
+  for (const char* basis :
+       {"histogram_8_means", "histogram_32", "histogram_32_means", "histogram_128", "histogram_512",
+        "harmonics_2", "harmonics", "harmonics_8"})
+    size.families.emplace_back(basis);
+  if (quick)
+    size = {{1'000}, {2}, {}, {"view", "histogram_32", "histogram_32_means", "path_traced"}};
   return size;
 }
 
@@ -156,7 +189,7 @@ std::vector<Contender> contenders(const SceneSource& scene, const SweepSize& siz
   std::vector<Contender> found;
   for (const Family& family : families()) {
     const bool wanted =
-        size.families.empty() ||
+        (size.families.empty() && !family.byNameAlone) ||
         std::find(size.families.begin(), size.families.end(), family.name) != size.families.end();
     if (!wanted) continue;
     const std::vector<std::int64_t> works = worksOf(family.work, size);

@@ -22,6 +22,7 @@ struct Family {
   std::vector<std::string> sets;
   Work work = Work::photons;
   bool needsParticles = false;
+  bool byNameAlone = false;  ///< no part of a sweep over all families
 };
 
 const std::vector<Family>& families();
@@ -46,6 +47,8 @@ struct SweepSize {
   static SweepSize quick();
   /// For the hard cases: fewer families and levels.
   static SweepSize hardCase(bool quick);
+  /// For the comparison of bases: one amount of work for each.
+  static SweepSize bases(bool quick);
 };
 
 /// Every contender that the scene accepts, level by level.

@@ -24,6 +24,12 @@ std::vector<std::string> eachVolume(const scene::SceneFile& scene, const std::st
   return sets;
 }
 
+std::vector<std::string> phaseSets(const scene::SceneFile& scene, double g) {
+  return eachVolume(scene, "phase", [g](const scene::VolumeEntry&) {
+    return fmt::format("{{ type = \"henyey_greenstein\", g = {} }}", g);
+  });
+}
+
 // A narrow spot from the side whose cone ends inside the smoke.
 std::string hardSpot(const Vec3d& center, double radius) {
   const Vec3d position = center + radius * Vec3d(2.0, -1.2, 1.6);
@@ -37,15 +43,19 @@ std::string hardSpot(const Vec3d& center, double radius) {
 
 }  // namespace
 
+std::vector<HardCase> basisCases(const scene::SceneFile& scene, bool quick) {
+  std::vector<HardCase> cases;
+  for (const double g : quick ? std::vector{0.5} : std::vector{-0.5, 0.0, 0.5, 0.7, 0.85, 0.95})
+    cases.push_back({fmt::format("g = {}", g), "bases compared", phaseSets(scene, g)});
+  return cases;
+}
+
 std::vector<HardCase> hardCases(const scene::SceneFile& scene, const SceneFacts& facts) {
   const Vec3d center = facts.bounds.center();
   const double radius = 0.5 * glm::length(facts.bounds.max - facts.bounds.min);
   const auto thinner = [](const scene::VolumeEntry& volume) {
     const Vec3d scale = kThinning * volume.values.vec3("density_scale");
     return vec(scale);
-  };
-  const auto forward = [](const scene::VolumeEntry&) {
-    return fmt::format("{{ type = \"henyey_greenstein\", g = {} }}", kForwardG);
   };
   const std::string lamp =
       fmt::format("[{{ type = \"point\", name = \"inside\", position = {}, intensity = {:.9g} }}]",
@@ -57,7 +67,7 @@ std::vector<HardCase> hardCases(const scene::SceneFile& scene, const SceneFacts&
        {},
        kFewParticles},
       {"forward_phase", fmt::format("Henyey-Greenstein phase with g = {} everywhere", kForwardG),
-       eachVolume(scene, "phase", forward)},
+       phaseSets(scene, kForwardG)},
       {"thin_smoke", fmt::format("extinction multiplied by {}", kThinning),
        eachVolume(scene, "density_scale", thinner)},
       {"light_inside", "one point lamp in the middle of the smoke's box", {"light=" + lamp}},

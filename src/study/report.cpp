@@ -159,6 +159,8 @@ std::string page(const StudyResult& result, const PictureSettings& settings) {
   body += heading(2, "Time and memory") + tableTag(pointTable(main));
   body += heading(2, "Bias and variance") + errorTables(main);
   body += hardCases(result, settings);
+  if (!result.bases.empty())
+    body += heading(2, "Bases of directions") + tableTag(basisTable(result));
   if (const Table table = estimateTable(result); table.rows.size() > 1)
     body += heading(2, "How true the estimate of a frame's error is") +
             paragraph(

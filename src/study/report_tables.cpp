@@ -33,6 +33,11 @@ std::string optionalNumber(const std::optional<double>& value) {
   return value ? fmt::format("{:.3g}", *value) : std::string("\u2013");
 }
 
+// Whether a light cache can hold it.
+bool cacheable(const PointResult& p) {
+  return p.lightMemoryBytes > 0 && p.family != "view";
+}
+
 }  // namespace
 
 Table pointTable(const SweepResult& sweep) {
@@ -153,6 +158,45 @@ Table hardCaseTable(const StudyResult& result) {
   return table;
 }
 
+Table basisTable(const StudyResult& result) {
+  Table table;
+  table.caption =
+      "Bases of directions, layer multiple, all pixels. The last two columns are squared error "
+      "times "
+      "cost, so less is better; the best of those that a light cache can hold (all but view) is "
+      "marked *";
+  table.firstNumber = 2;
+  table.rows.push_back({"scene", "basis", "stored light [MiB]", "CPU [s]", "relative error",
+                        "bias\u00b2", "mean over reference's", "relMSE x CPU s", "relMSE x MiB"});
+  for (const SweepResult& sweep : result.bases) {
+    const auto cost = [](const PointResult& p, bool bytes) {
+      const double mebibytes = static_cast<double>(p.lightMemoryBytes) / 1048576;
+      return std::max(0.0, p.errors[kMultiple][kAllPixels].relMse.value) *
+             (bytes ? mebibytes : p.cpuSeconds.median);
+    };
+    const auto marked = [&](const PointResult& p, bool bytes) {
+      const bool best =
+          cacheable(p) &&
+          std::all_of(sweep.points.begin(), sweep.points.end(), [&](const PointResult& other) {
+            return !cacheable(other) || cost(p, bytes) <= cost(other, bytes);
+          });
+      return fmt::format("{:.3g}{}", cost(p, bytes), best ? " *" : "");
+    };
+    for (const PointResult& p : sweep.points) {
+      const ErrorFigures& f = p.errors[kMultiple][kAllPixels];
+      const bool light = p.lightMemoryBytes > 0;
+      table.rows.push_back(
+          {sweep.name, p.label,
+           light ? fmt::format("{:.1f}", static_cast<double>(p.lightMemoryBytes) / 1048576)
+                 : std::string("\u2013"),
+           seconds(p.cpuSeconds.median), fmt::format("{:.3g}", relativeError(f)),
+           fmt::format("{:.3g}", f.biasSquared.value), fmt::format("{:.3f}", f.meanRatio.value),
+           marked(p, false), light ? marked(p, true) : std::string("\u2013")});
+    }
+  }
+  return table;
+}
+
 Table estimateTable(const StudyResult& result) {
   Table table;
   table.caption =
@@ -196,9 +240,10 @@ Table leftOutTable(const StudyResult& result) {
   Table table;
   table.firstNumber = 9;
   table.rows.push_back({"sweep", "left out", "why"});
-  for (const SweepResult& sweep : result.sweeps)
-    for (const LeftOut& item : sweep.leftOut)
-      table.rows.push_back({sweep.name, item.name, item.why});
+  for (const auto* sweeps : {&result.sweeps, &result.bases})
+    for (const SweepResult& sweep : *sweeps)
+      for (const LeftOut& item : sweep.leftOut)
+        table.rows.push_back({sweep.name, item.name, item.why});
   for (const LeftOut& item : result.leftOut)
     table.rows.push_back({"", item.name, item.why});
   return table;
@@ -211,14 +256,15 @@ Table referenceTable(const StudyResult& result) {
   table.rows.push_back({"sweep", "samples a pixel", "of them found", "seconds spent",
                         "noise, total", "noise, multiple", "by path traced frames",
                         "a tenth of the best or less", "key"});
-  for (const SweepResult& sweep : result.sweeps) {
-    const ReferenceNote& r = sweep.reference;
-    table.rows.push_back({sweep.name, std::to_string(r.samples), std::to_string(r.samplesBefore),
-                          fmt::format("{:.1f}", r.seconds), fmt::format("{:.2g}", r.noise[kTotal]),
-                          fmt::format("{:.2g}", r.noise[kMultiple]),
-                          fmt::format("{:.2g}", r.pathNoise[kMultiple]),
-                          r.targetReached ? "yes" : "no", r.key});
-  }
+  for (const auto* sweeps : {&result.sweeps, &result.bases})
+    for (const SweepResult& sweep : *sweeps) {
+      const ReferenceNote& r = sweep.reference;
+      table.rows.push_back(
+          {sweep.name, std::to_string(r.samples), std::to_string(r.samplesBefore),
+           fmt::format("{:.1f}", r.seconds), fmt::format("{:.2g}", r.noise[kTotal]),
+           fmt::format("{:.2g}", r.noise[kMultiple]), fmt::format("{:.2g}", r.pathNoise[kMultiple]),
+           r.targetReached ? "yes" : "no", r.key});
+    }
   return table;
 }
 

@@ -13,6 +13,8 @@ Table equalTimeTable(const std::vector<Curve>& curves);
 Table equalErrorTable(const std::vector<Curve>& curves);
 Table crossoverTable(const std::vector<Curve>& curves);
 Table hardCaseTable(const StudyResult& result);
+/// Error of each basis by its bytes and its seconds, for every g.
+Table basisTable(const StudyResult& result);
 /// Estimated against measured error of frames that were asked for one, in every scene.
 Table estimateTable(const StudyResult& result);
 Table flickerTable(const StudyResult& result);

@@ -29,6 +29,8 @@ constexpr int kHardEdge = 128;
 
 // Parts of the time, of what is left when each begins.
 constexpr double kMeasureShare = 0.35, kReferenceShare = 0.45, kHardShare = 0.6;
+// Of all of it.
+constexpr double kBasesShare = 0.3;
 
 Vec2i resolutionOf(const scene::SceneFile& scene) {
   const Vec2d size = scene.camera.vec2("resolution");
@@ -51,6 +53,7 @@ class Study {
     const scene::SceneFile scene = m_source.open();
     const std::string smaller = resolutionOverride(resolutionOf(scene), options.quick);
     if (!smaller.empty()) m_source.sets.push_back(smaller);
+    if (options.bases) m_reserve = kBasesShare * m_seconds;
     m_frames = options.frames.empty() ? scene::sceneFrames(scene) : options.frames;
     m_frame = m_frames.back();
   }
@@ -66,12 +69,14 @@ class Study {
     result.sweeps.push_back(main.evaluate());
     if (m_options.hardCases) runHardCases(result);
     if (m_options.flicker) runFlicker(result);
+    m_reserve = 0;
+    if (m_options.bases) runBases(result);
     result.elapsedSeconds = m_watch.seconds();
     return result;
   }
 
  private:
-  double left() const { return std::max(0.0, m_seconds - m_watch.seconds()); }
+  double left() const { return std::max(0.0, m_seconds - m_reserve - m_watch.seconds()); }
   std::string name() const { return fileStem(m_options.scene.stem().string()); }
 
   std::vector<std::int64_t> movingFrames() const {
@@ -122,16 +127,31 @@ class Study {
     return main;
   }
 
-  void runHardCases(StudyResult& result) {
+  // The scene in fewer pixels.
+  SceneSource small(const SceneFacts& facts) const {
     SceneSource base = m_source;
-    const scene::SceneFile scene = base.open();
-    const SceneFacts facts = sceneFacts(scene, m_frame);
     if (const int edge = std::max(facts.width, facts.height); edge > kHardEdge)
       base.sets.push_back(fmt::format("camera.resolution=[{}, {}]",
                                       std::max(1, facts.width * kHardEdge / edge),
                                       std::max(1, facts.height * kHardEdge / edge)));
-    const std::vector<HardCase> cases = hardCases(scene, facts);
-    const double budget = left() * (m_options.flicker ? kHardShare : 1.0);
+    return base;
+  }
+
+  void runHardCases(StudyResult& result) {
+    const scene::SceneFile scene = m_source.open();
+    const SceneFacts facts = sceneFacts(scene, m_frame);
+    runCases(hardCases(scene, facts), small(facts), SweepSize::hardCase(m_options.quick),
+             left() * (m_options.flicker ? kHardShare : 1.0), result.sweeps);
+  }
+
+  void runBases(StudyResult& result) {
+    const scene::SceneFile scene = m_source.open();
+    runCases(basisCases(scene, m_options.quick), small(sceneFacts(scene, m_frame)),
+             SweepSize::bases(m_options.quick), left(), result.bases);
+  }
+
+  void runCases(const std::vector<HardCase>& cases, const SceneSource& base, const SweepSize& size,
+                double budget, std::vector<SweepResult>& results) {
     const double end = m_watch.seconds() + budget;
     for (std::size_t i = 0; i < cases.size(); ++i) {
       const HardCase& c = cases[i];
@@ -139,7 +159,7 @@ class Study {
           std::max(0.0, end - m_watch.seconds()) / static_cast<double>(cases.size() - i);
       SweepPlan hard = plan(base.with(c.sets), c.name);
       hard.description = c.description;
-      hard.size = SweepSize::hardCase(m_options.quick);
+      hard.size = size;
       hard.seeds = 3;
       if (c.particles > 0) {
         hard.particleSets = particleSets(base, {m_frame}, c.particles, true, m_cache);
@@ -151,7 +171,7 @@ class Study {
       Sweep sweep(std::move(hard));
       sweep.measure();
       sweep.refine();
-      result.sweeps.push_back(sweep.evaluate());
+      results.push_back(sweep.evaluate());
     }
   }
 
@@ -175,7 +195,7 @@ class Study {
   fs::path m_cache;
   RunFolder m_runs;
   Stopwatch m_watch;
-  double m_seconds;
+  double m_seconds, m_reserve = 0;  // the second for what comes last
   SceneSource m_source;
   std::vector<std::int64_t> m_frames;
   std::int64_t m_frame = 1;

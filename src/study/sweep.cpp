@@ -281,6 +281,7 @@ PointResult Sweep::evaluate(const Entry& entry,
   point.peakMemoryBytes =
       spreadOver(entry.runs, [](const RenderOutcome& r) { return r.peakMemoryBytes; });
   point.photonsStored = entry.runs.front().photonsStored;
+  point.lightMemoryBytes = entry.runs.front().lightMemoryBytes;
   point.estimatedError =
       spreadOver(entry.runs, [](const RenderOutcome& r) { return r.estimatedError; });
   std::vector<image::Image> frames;

@@ -58,6 +58,7 @@ Json toJson(const PointResult& p) {
           {"cpu_seconds", toJson(p.cpuSeconds)},
           {"peak_memory_bytes", toJson(p.peakMemoryBytes)},
           {"photons_stored", p.photonsStored},
+          {"light_memory_bytes", p.lightMemoryBytes},
           {"estimated_error", toJson(p.estimatedError)},
           {"errors", std::move(errors)}};
 }
@@ -106,7 +107,8 @@ constexpr const char* kHeader =
     "variance,variance_low95,variance_high95,mean_ratio,mean_ratio_low95,mean_ratio_high95,"
     "reference_noise_subtracted,read_s,rasterize_s,trace_s,resolve_s,march_s,"
     "total_s,total_min_s,total_max_s,cpu_s,cpu_min_s,cpu_max_s,"
-    "peak_memory_bytes,peak_memory_min_bytes,peak_memory_max_bytes,photons_stored,"
+    "peak_memory_bytes,peak_memory_min_bytes,peak_memory_max_bytes,photons_stored,light_memory_"
+    "bytes,"
     "estimated_error,estimated_error_min,estimated_error_max\r\n";
 
 void addRows(std::string& text, const SweepResult& sweep, const PointResult& p) {
@@ -121,8 +123,9 @@ void addRows(std::string& text, const SweepResult& sweep, const PointResult& p) 
                           cells(f.variance), cells(f.meanRatio), cell(f.referenceNoise));
       text += fmt::format("{},{},{},{},{},", cell(s.read.median), cell(s.rasterize.median),
                           cell(s.trace.median), cell(s.resolve.median), cell(s.march.median));
-      text += fmt::format("{},{},{},{},{}\r\n", cells(s.total), cells(p.cpuSeconds),
-                          cells(p.peakMemoryBytes), p.photonsStored, cells(p.estimatedError));
+      text += fmt::format("{},{},{},{},{},{}\r\n", cells(s.total), cells(p.cpuSeconds),
+                          cells(p.peakMemoryBytes), p.photonsStored, p.lightMemoryBytes,
+                          cells(p.estimatedError));
     }
 }
 
@@ -141,16 +144,19 @@ std::string csvField(const std::string& text) {
 
 std::string csvText(const StudyResult& result) {
   std::string text = kHeader;
-  for (const SweepResult& sweep : result.sweeps)
-    for (const PointResult& point : sweep.points)
-      addRows(text, sweep, point);
+  for (const auto* sweeps : {&result.sweeps, &result.bases})
+    for (const SweepResult& sweep : *sweeps)
+      for (const PointResult& point : sweep.points)
+        addRows(text, sweep, point);
   return text;
 }
 
 std::string jsonText(const StudyResult& result) {
-  Json sweeps = Json::array(), flicker = Json::array();
+  Json sweeps = Json::array(), bases = Json::array(), flicker = Json::array();
   for (const SweepResult& sweep : result.sweeps)
     sweeps.push_back(toJson(sweep));
+  for (const SweepResult& sweep : result.bases)
+    bases.push_back(toJson(sweep));
   for (const FlickerRow& row : result.flicker)
     flicker.push_back({{"sequence", row.sequence},
                        {"label", row.label},
@@ -170,6 +176,7 @@ std::string jsonText(const StudyResult& result) {
       {"start",
        {{"seconds", toJson(result.startSeconds)}, {"memory_bytes", result.startMemoryBytes}}},
       {"sweeps", std::move(sweeps)},
+      {"bases", std::move(bases)},
       {"flicker", std::move(flicker)},
       {"left_out", toJson(result.leftOut)}};
   return root.dump(2, ' ', false, Json::error_handler_t::replace) + '\n';

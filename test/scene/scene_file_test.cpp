@@ -61,6 +61,7 @@ const KeyCase kKeys[] = {
     {"estimator", "radius", "0.0"},
     {"estimator", "deposit_radius", "0.0"},
     {"estimator", "spatial_kernel", "\"epanechnikov\""},
+    {"estimator", "smoothing", "\"twicing\""},
     {"estimator", "carrier", "\"voxels\""},
     {"estimator", "basis", "\"auto\""},
     {"estimator", "deposit", "\"track_length\""},

@@ -46,6 +46,13 @@ struct Names<SpatialKernel> {
                                                  {SpatialKernel::gaussian, "gaussian"}};
 };
 template <>
+struct Names<Smoothing> {
+  static constexpr Named<Smoothing> all[] = {{Smoothing::twicing, "twicing"},
+                                             {Smoothing::plain, "plain"},
+                                             {Smoothing::density, "density"},
+                                             {Smoothing::mean, "mean"}};
+};
+template <>
 struct Names<sphere::DirectionDeposit> {
   static constexpr Named<sphere::DirectionDeposit> all[] = {
       {sphere::DirectionDeposit::nearest, "nearest"},

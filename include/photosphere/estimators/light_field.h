@@ -21,6 +21,13 @@ enum class Deposit { trackLength, collision };
 /// How a collision reaches particles (METHOD.md section 4): gather is eq. 7a, scatter eq. 7b.
 enum class EnergyRule { gather, scatter };
 enum class SpatialKernel { epanechnikov, box, gaussian };
+/// How fluence on voxels is smoothed by the spatial kernel (METHOD.md section 5.3).
+enum class Smoothing {
+  twicing,  ///< plainly, then sharpened by what a second blur takes away
+  plain,    ///< weighted means of fluence, which lose light where the smoke is lit at its edge
+  density,  ///< of fluence times extinction, over those of extinction, which gain light there
+  mean,     ///< the mean of `plain` and `density`
+};
 /// What stands for the directions of a bin (Min & Ihm 2010, figure 5).
 enum class Representative {
   bin,   ///< the bin itself: light is spread over it
@@ -45,10 +52,11 @@ struct LightFieldLayout {
   Deposit deposit = Deposit::trackLength;
   EnergyRule energy = EnergyRule::gather;
   SpatialKernel kernel = SpatialKernel::epanechnikov;
-  int rows = 2;      ///< 8 rows^2 direction bins (histogram)
-  int order = 4;     ///< (order + 1)^2 coefficients (sphericalHarmonics)
-  int channels = 3;  ///< 1 where lights and media are grey
-  int phases = 1;    ///< distinct phase functions (view)
+  Smoothing smoothing = Smoothing::twicing;  ///< of fluence on voxels, resolved per view
+  int rows = 2;                              ///< 8 rows^2 direction bins (histogram)
+  int order = 4;                             ///< (order + 1)^2 coefficients (sphericalHarmonics)
+  int channels = 3;                          ///< 1 where lights and media are grey
+  int phases = 1;                            ///< distinct phase functions (view)
   bool unscattered =
       false;  ///< a second set holds the light of lamps with extent before its first event
   double lightVoxel = 2.0;     ///< light voxel edge over density voxel edge
@@ -79,10 +87,10 @@ struct LightFieldLayout {
     return basis == Basis::histogram && representative == Representative::mean;
   }
   /// @throws ConfigError for a bandwidth or truncation that makes no kernel
-  sphere::SmoothingKernel smoothing() const { return {angularKernel, bandwidth, truncation}; }
+  sphere::SmoothingKernel directionKernel() const { return {angularKernel, bandwidth, truncation}; }
   /// How directions reach bins. @throws ConfigError for DirectionDeposit::kernel without a kernel
   sphere::BinShares binShares() const {
-    return sphere::BinShares(sphere::Partition(rows), direction, smoothing());
+    return sphere::BinShares(sphere::Partition(rows), direction, directionKernel());
   }
   /// True when values are power [W] of collisions rather than fluence rate.
   bool holdsPower() const { return carrier == Carrier::particles && deposit == Deposit::collision; }
@@ -130,8 +138,6 @@ double automaticRadius(const transport::Medium& medium, const LightFieldLayout& 
 
 /// Resolves the field for one view: histogram and phase fold into one colour per carrier and phase
 /// function, which is then smoothed and laid out for lookups (METHOD.md sections 5.1 to 5.3).
-/// Fluence on voxels is smoothed plainly and sharpened by twicing, which was nearer to path tracing
-/// in every case tried than METHOD's mean of plain and density-weighted smoothing.
 /// Evaluate::perStep keeps the field instead and asks it at every march step.
 /// @param medium  must outlive the source
 /// @param field   std::move it where it is not needed again

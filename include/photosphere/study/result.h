@@ -62,6 +62,7 @@ struct PointResult {
   Spread cpuSeconds;
   Spread peakMemoryBytes;  ///< of a process that rendered this alone
   std::uint64_t photonsStored = 0;
+  std::uint64_t lightMemoryBytes = 0;  ///< that the stored light takes
   LayerFigures errors;
   Spread estimatedError;  ///< that the frames give of themselves, layer total; 0 without
   image::Image frame;     ///< R, G, B of the first seed; of a family's most work alone
@@ -122,6 +123,7 @@ struct StudyResult : RunFacts {
   Spread startSeconds;  ///< a child process that does nothing: its start and end
   std::uint64_t startMemoryBytes = 0;
   std::vector<SweepResult> sweeps;  ///< first the scene itself, then the hard cases
+  std::vector<SweepResult> bases;   ///< the scene with one g after the other
   std::vector<FlickerRow> flicker;
   std::vector<LeftOut> leftOut;
 };

@@ -22,6 +22,7 @@ struct StudyOptions {
   int seeds = 5;                      ///< at least 3
   std::vector<std::string> families;  ///< of contenders; empty = all
   bool hardCases = true, flicker = true;
+  bool bases = false;    ///< compare the bases of directions for many g
   bool quick = false;    ///< tiny frames and little work, to try the command
   unsigned threads = 0;  ///< as reported
   std::string ocioConfig, ocioDisplay, ocioView;  ///< of the pictures; empty = defaults

@@ -112,6 +112,8 @@ void declareSettings(CLI::App& app, Options& options) {
   app.add_flag("--no-hard-cases", options.noHardCases,
                "Leave out the scenes that are hard for the photosphere");
   app.add_flag("--no-flicker", options.noFlicker, "Leave out frame-to-frame error");
+  app.add_flag("--bases", s.bases,
+               "Also compare the bases of directions, for phases of g from -0.5 to 0.95");
   app.add_flag("--quick", s.quick, "Tiny frames and little work, to try the command");
 }
 
