@@ -32,6 +32,10 @@ const std::vector<Family>& families() {
       {"harmonics",
        "photosphere, harmonics of order 4",
        {"estimator.basis=spherical_harmonics", "estimator.order=4"}},
+      {"histogram_32_gather",
+       "photosphere, 32 bins, looked up after the first bounce",
+       {"estimator.basis=histogram", "estimator.rows=2", "estimator.photons=1000000"},
+       Work::gatherRays},
       basisOnly("histogram_8_means", "photosphere, 8 bins and their mean directions", "histogram",
                 {"estimator.rows=1", "estimator.representative=mean"}),
       basisOnly("histogram_32_means", "photosphere, 32 bins and their mean directions", "histogram",
@@ -102,7 +106,7 @@ SweepSize SweepSize::hardCase(bool quick) {
 }
 
 SweepSize SweepSize::bases(bool quick) {
-  SweepSize size{{1'024'000}, {64}, {}, {"view", "path_traced"}};
+  SweepSize size{{1'024'000}, {256}, {}, {"view", "path_traced", "histogram_32_gather"}};
   for (const char* basis :
        {"histogram_8_means", "histogram_32", "histogram_32_means", "histogram_128", "histogram_512",
         "harmonics_2", "harmonics", "harmonics_8"})
@@ -147,6 +151,9 @@ Contender contender(const Family& family, int level, std::int64_t work) {
   } else if (family.work == Work::samples) {
     c.sets.push_back(fmt::format("estimator.samples={}", work));
     c.label += fmt::format(", {} samples a pixel", work);
+  } else if (family.work == Work::gatherRays) {
+    c.sets.push_back(fmt::format("estimator.final_gather={}", work));
+    c.label += fmt::format(", {} rays a pixel", work);
   } else if (family.work == Work::errorTarget) {
     c.sets.push_back(fmt::format("render.target_error={}", 1.0 / static_cast<double>(work)));
     c.label += fmt::format(" is {:.3g} %", 100.0 / static_cast<double>(work));
@@ -159,6 +166,7 @@ std::vector<std::int64_t> worksOf(Work work, const SweepSize& size) {
     case Work::photons:
       return size.photons;
     case Work::samples:
+    case Work::gatherRays:
       return size.samples;
     case Work::errorTarget:
       return size.targets;

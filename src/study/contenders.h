@@ -12,7 +12,7 @@
 namespace photosphere::study {
 
 /// What makes one contender of a family better and slower.
-enum class Work { photons, samples, errorTarget, none };
+enum class Work { photons, samples, gatherRays, errorTarget, none };
 
 /// Settings that are swept together. An estimator or option that this version does not serve drops
 /// out by itself: the scene refuses it.
@@ -33,7 +33,7 @@ std::string familyTitle(const std::string& name);
 struct Contender {
   const Family* family = nullptr;
   int level = 0;
-  std::int64_t work = 0;  ///< photons, samples a pixel, or 1 over the relative error asked for
+  std::int64_t work = 0;  ///< photons, samples or rays a pixel, or 1 over the error asked for
   std::vector<std::string> sets;
   std::string label;  ///< "photosphere, 32 bins, 256k photons"
 };

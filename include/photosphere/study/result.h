@@ -53,10 +53,11 @@ struct StageSpreads {
 
 /// One setting of one family of contenders, over all its seeds.
 struct PointResult {
-  std::string family;     ///< such as "view"
-  std::string label;      ///< such as "view, 250k photons"
-  std::string settings;   ///< overrides of the scene, `key=value; key=value`
-  std::int64_t work = 0;  ///< photons emitted, samples a pixel, or 1 over the error asked for
+  std::string family;    ///< such as "view"
+  std::string label;     ///< such as "view, 250k photons"
+  std::string settings;  ///< overrides of the scene, `key=value; key=value`
+  std::int64_t work =
+      0;  ///< photons emitted, samples or rays a pixel, or 1 over the error asked for
   int seeds = 0;
   StageSpreads seconds;
   Spread cpuSeconds;
