@@ -18,7 +18,7 @@ class Orthographic final : public PlacedCamera {
 
   bool hasEye() const override { return false; }
 
-  Mat4d ndcFromWorld() const override {
+  std::optional<Mat4d> ndcFromWorld() const override {
     Mat4d ndc(1.0);
     ndc[0][0] = 0.5 / halfWindow().x;
     ndc[1][1] = -0.5 / halfWindow().y;

@@ -23,7 +23,7 @@ class Perspective final : public PlacedCamera {
 
   bool hasEye() const override { return true; }
 
-  Mat4d ndcFromWorld() const override {
+  std::optional<Mat4d> ndcFromWorld() const override {
     // ndc = (1/2 + x / (2 halfX depth), 1/2 - y / (2 halfY depth)), w = depth.
     Mat4d ndc(0.0);
     ndc[0][0] = 0.5 / halfWindow().x;

@@ -15,17 +15,18 @@ PhaseReader::PhaseReader(const LightFieldLayout& layout, const transport::Medium
                        layout.direction != sphere::DirectionDeposit::kernel;
   const bool restores = layout.evaluate == Evaluate::perStep && layout.merge == Merge::sampled;
   if (restores && !layout.keepsMeans()) {
-    restore(plain);
+    restore();
     return;
   }
   if (layout.basis == Basis::histogram && !smooths && !layout.keepsMeans()) {
-    m_bins.emplace(layout.binShares(), plain, function.g(), sphere::Reconstruction::smooth);
+    tabulate(function);
     return;
   }
   // Smoothing the light is smoothing the phase function: both convolve with the kernel.
   sphere::LegendreMoments moments = sphere::phaseMoments(plain);
   if (smooths)
-    moments = sphere::convolved(moments, sphere::kernelMoments(layout.directionKernel(), moments.size()));
+    moments =
+        sphere::convolved(moments, sphere::kernelMoments(layout.directionKernel(), moments.size()));
   if (layout.basis == Basis::sphericalHarmonics) {
     // Convolving with a function of the angle scales degree l by its moment (Funk & Hecke): exact
     // up to the order, at the moments' own length zero.
@@ -41,15 +42,32 @@ PhaseReader::PhaseReader(const LightFieldLayout& layout, const transport::Medium
     return;
   }
   const sphere::ZonalTable smooth(moments);
-  m_bins.emplace(
-      layout.binShares(),
-      [&smooth](const Vec3f& w, const Vec3f& wo) { return static_cast<double>(smooth(w, wo)); },
-      smooth.meanCosine(), sphere::Reconstruction::smooth);
+  const auto smoothed = [&smooth](const Vec3f& w, const Vec3f& wo) {
+    return static_cast<double>(smooth(w, wo));
+  };
+  m_bins.push_back({1.0f, sphere::BinWeights(layout.binShares(), smoothed, smooth.meanCosine(),
+                                             sphere::Reconstruction::smooth)});
+}
+
+// Lobe by lobe: each has a width and a side of its own, which decide where its table is fine.
+void PhaseReader::tabulate(const phase::PhaseFunction& function) {
+  for (int i = 0; i < function.lobes(); ++i) {
+    const phase::Draine& lobe = function.lobe(i);
+    // cos^2 is about as narrow as a lobe of mean cosine 1/2.
+    const double g =
+        lobe.alpha() > 0 ? std::copysign(std::max(0.5, std::abs(lobe.g())), lobe.g()) : lobe.g();
+    const auto evaluate = [&lobe](const Vec3f& w, const Vec3f& wo) {
+      return static_cast<double>(lobe.evaluate(w, wo));
+    };
+    m_bins.push_back(
+        {static_cast<float>(function.weight(i)),
+         sphere::BinWeights(m_layout.binShares(), evaluate, g, sphere::Reconstruction::smooth)});
+  }
 }
 
 // The paper's way: bins are restored to K directions (eq. 8), and the phase function is taken at
 // those (eq. 9).
-void PhaseReader::restore(const sphere::BinWeights::Phase&) {
+void PhaseReader::restore() {
   const int rows = static_cast<int>(std::lround(std::sqrt(m_layout.directions / 8.0)));
   const sphere::Partition bins(m_layout.rows), cells(rows);
   const bool smooths = m_layout.direction != sphere::DirectionDeposit::kernel;
@@ -63,9 +81,16 @@ void PhaseReader::restore(const sphere::BinWeights::Phase&) {
 void PhaseReader::turn(const Vec3f& wo, Toward& toward) const {
   toward.wo = wo;
   const auto bins = static_cast<std::size_t>(m_layout.bins());
-  if (m_bins) {
+  if (!m_bins.empty()) {
     toward.weights.resize(bins);
-    m_bins->weights(wo, toward.weights.data());
+    m_bins[0].table.weights(wo, toward.weights.data());
+    if (m_bins.size() > 1) {
+      toward.scratch.resize(bins);
+      m_bins[1].table.weights(wo, toward.scratch.data());
+      for (std::size_t j = 0; j < bins; ++j)
+        toward.weights[j] =
+            m_bins[0].weight * toward.weights[j] + m_bins[1].weight * toward.scratch[j];
+    }
   } else if (m_harmonics) {
     toward.weights.resize(bins);
     m_harmonics->evaluate(wo, toward.weights.data());

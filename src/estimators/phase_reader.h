@@ -37,13 +37,18 @@ class PhaseReader {
     return m_layout.channels == 1 ? Rgb(values[0]) : Rgb(values[0], values[1], values[2]);
   }
   float lobe(const float* set, int bin, const Vec3f& wo) const;
-  void restore(const sphere::BinWeights::Phase& phase);
+  void restore();
+  void tabulate(const phase::PhaseFunction& function);
 
   LightFieldLayout m_layout;
   const transport::Medium& m_medium;
   int m_phase;
   // One of these, by layout; none for the view basis, whose values hold the phase function.
-  std::optional<sphere::BinWeights> m_bins;
+  struct Bins {
+    float weight;
+    sphere::BinWeights table;
+  };
+  std::vector<Bins> m_bins;  // by lobe of the phase function
   std::optional<sphere::SphericalHarmonics> m_harmonics;
   std::vector<float> m_moments;              // of the phase function, by harmonic
   std::optional<sphere::LobeTable> m_lobes;  // Representative::mean

@@ -165,7 +165,8 @@ class FixedRadiusSet final : public PhotonSet {
   }
 
   Rgb scattered(const Vec3f& p, const Vec3f& wo, const Lobe& lobe) const override {
-    const double g = lobe.phase.g();
+    // Any other phase function comes as a table (Lobe).
+    const double g = lobe.phase.plain() ? lobe.phase.plain()->g() : 0.0;
     Run run;
     run.center = p;
     run.inverseRadiusSquared = 1.0f / (m_radius * m_radius);

@@ -111,9 +111,9 @@ class CollisionSink final : public transport::FlightSink {
   std::uint64_t m_counts[2] = {0, 0};
 };
 
-std::shared_ptr<const sphere::ZonalTable> smoothed(const phase::HenyeyGreenstein& phase,
+std::shared_ptr<const sphere::ZonalTable> smoothed(const phase::PhaseFunction& phase,
                                                    const sphere::SmoothingKernel& kernel) {
-  if (!kernel.acts()) return nullptr;
+  if (!kernel.acts() && phase.plain()) return nullptr;
   const sphere::LegendreMoments moments = sphere::phaseMoments(
       [&](const Vec3f& w, const Vec3f& wo) { return static_cast<double>(phase.evaluate(w, wo)); });
   return std::make_shared<sphere::ZonalTable>(
@@ -136,7 +136,7 @@ class Map final : public PhotonMap {
         std::max(layout.radius, kSmallestRadius * maxComponent(medium.bounds().extent()));
     m_sets.push_back(makeSet(sink.take(0), usable));
     if (layout.unscattered) m_sets.push_back(makeSet(sink.take(1), usable));
-    for (const phase::HenyeyGreenstein& phase : medium.phases())
+    for (const phase::PhaseFunction& phase : medium.phases())
       m_lobes.push_back({phase, smoothed(phase, layout.directionKernel)});
   }
 

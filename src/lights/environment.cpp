@@ -29,6 +29,7 @@ class EnvironmentLight final : public Light {
 
   Rgb background(const Vec3f&) const override { return m_radiance; }
   bool isDelta() const override { return false; }
+  bool surrounds() const override { return true; }
   bool isGrey() const override { return isGreyColor(m_radiance); }
 
  private:

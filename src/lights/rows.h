@@ -51,6 +51,16 @@ constexpr Param softRadiusRow() {
           .served = false};
 }
 
+constexpr Param bodyRadiusRow() {
+  return {.name = "radius",
+          .type = ParamType::real,
+          .unit = "scene units",
+          .defaultText = "0.5",
+          .help = "of the light's body",
+          .min = 1e-9,
+          .max = 1e9};
+}
+
 /// intensity times color.
 inline Rgb scaledColor(const ParamValues& values) {
   return values.rgb("color") * static_cast<float>(values.real("intensity"));

@@ -16,7 +16,7 @@ constexpr Param params[] = {
      .max = 1.0},
 };
 
-HenyeyGreenstein create(const ParamValues& values) {
+PhaseFunction create(const ParamValues& values) {
   return HenyeyGreenstein(values.real("g"));
 }
 

@@ -6,7 +6,7 @@ namespace photosphere::phase::plugins {
 
 namespace {
 
-HenyeyGreenstein create(const ParamValues&) {
+PhaseFunction create(const ParamValues&) {
   return HenyeyGreenstein(0.0);
 }
 

@@ -156,7 +156,7 @@ class FrameLoop {
       const cameras::CameraRay ray = m_camera.ray(raster);
       RayRadiance r = m_integrator.radiance(m_options.space.localFromWorld(ray.origin),
                                             Vec3f(ray.direction), rng, counters);
-      r.depth *= static_cast<float>(glm::dot(ray.direction, m_axis));
+      if (!m_camera.isPanorama()) r.depth *= static_cast<float>(glm::dot(ray.direction, m_axis));
       const bool nan = isNan(r);
       if (nan || isNegative(r)) {
         ++(nan ? bad.nans : bad.negatives);

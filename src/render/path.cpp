@@ -22,7 +22,7 @@ class PathIntegrator final : public Integrator {
     for (const auto& light : lights) {
       m_backgrounds.push_back(light.get());
       const bool sampled =
-          light->isDelta() || options.environment == EnvironmentSampling::nextEvent;
+          !light->surrounds() || options.environment == EnvironmentSampling::nextEvent;
       if (sampled) m_sampled.push_back(light.get());
     }
     const lights::BoundingSphere bounds = transport::boundingSphere(medium);

@@ -18,30 +18,8 @@ namespace photosphere::scene {
 
 namespace {
 
-// What the contract names and this version lacks. A name that a plug-in table serves leaves these
-// lists without effect.
-constexpr std::string_view kContractCameras[] = {"perspective", "orthographic", "equirectangular"};
-constexpr std::string_view kContractLights[] = {"point", "spot",   "directional", "rect",
-                                                "disk",  "sphere", "environment"};
-constexpr std::string_view kContractPhases[] = {
-    "isotropic", "henyey_greenstein", "double_henyey_greenstein", "rayleigh", "draine", "mie_fog"};
-constexpr std::string_view kContractLightKeys[] = {"size", "radius", "file"};
-
 [[noreturn]] void notServed(const std::string& place, std::string_view what) {
   throw ConfigError(fmt::format("{}: {} is not served by this version yet", place, what));
-}
-
-// The plug-in of a name, told apart from names that are only promised.
-template <class Plugin>
-const Plugin& choose(std::span<const Plugin* const> plugins, std::string_view name,
-                     std::string_view kind, std::span<const std::string_view> contract,
-                     const std::string& place) {
-  const auto names = pluginNames(plugins);
-  if (std::find(names.begin(), names.end(), name) == names.end() &&
-      std::find(contract.begin(), contract.end(), name) != contract.end())
-    throw ConfigError(fmt::format("{}: {} '{}' is not served by this version yet (served: {})",
-                                  place, kind, name, fmt::join(names, ", ")));
-  return findPlugin(plugins, name, kind, place);
 }
 
 std::string textOf(const toml::node& node, std::string_view key, const std::string& place) {
@@ -178,9 +156,8 @@ void SceneReader::readCamera() {
   m_scene.cameraWhere = place;
   if (type) m_scene.cameraType = textOf(*type, "type", where(*type, "camera.type", "camera"));
   const cameras::CameraPlugin& plugin =
-      choose(cameras::cameraModels(), m_scene.cameraType, "camera type",
-             std::span<const std::string_view>(kContractCameras),
-             type ? where(*type, "camera.type", "camera") : place);
+      findPlugin(cameras::cameraModels(), m_scene.cameraType, "camera type",
+                 type ? where(*type, "camera.type", "camera") : place);
   m_scene.camera = ParamValues(joinRows(cameras::cameraParams(), plugin.params));
   if (!from) return;
   for (const auto& [key, node] : *from) {
@@ -217,8 +194,7 @@ void SceneReader::readPhase(const toml::node& node, const std::string& path,
   if (const toml::node* type = from->get("type"))
     entry.phase = textOf(*type, "type", where(*type, path + ".type", path));
   const phase::PhasePlugin& plugin =
-      choose(phase::phaseFunctions(), entry.phase, "phase function",
-             std::span<const std::string_view>(kContractPhases), place);
+      findPlugin(phase::phaseFunctions(), entry.phase, "phase function", place);
   entry.phaseValues = ParamValues(plugin.params);
   for (const auto& [key, value] : *from) {
     const std::string k(key.str());
@@ -302,18 +278,14 @@ void SceneReader::readLight(const toml::table& from, std::size_t index) {
   const std::string typePlace = where(*type, path + ".type", path);
   entry.type = textOf(*type, "type", typePlace);
   const lights::LightPlugin& plugin =
-      choose(lights::lightModels(), entry.type, "light type",
-             std::span<const std::string_view>(kContractLights), typePlace);
+      findPlugin(lights::lightModels(), entry.type, "light type", typePlace);
   entry.values = ParamValues(joinRows(lights::lightParams(), plugin.params));
   for (const auto& [key, node] : from) {
     const std::string k(key.str());
     if (k == "type") continue;
     const std::string place = where(node, path + "." + k, path);
-    if (!hasRow(entry.values, k)) {
+    if (!hasRow(entry.values, k))
       explainForeignKey(lights::lightModels(), k, "light type", entry.type, place);
-      for (const std::string_view contract : kContractLightKeys)
-        if (k == contract) notServed(place, fmt::format("'{}'", k));
-    }
     entry.values.set(k, hasRow(entry.values, k) ? valueOf(node, k, place) : ParamValue(), place);
   }
   m_scene.lights.push_back(std::move(entry));

@@ -24,6 +24,16 @@ void hashField(Hasher& hasher, const volume::BrickField<float>& field, const Mat
       }
 }
 
+// One Henyey-Greenstein lobe hashes as it did when there was nothing else.
+void hashPhase(Hasher& hasher, const phase::PhaseFunction& phase) {
+  for (int i = 0; i < phase.lobes(); ++i) {
+    hasher.number(phase.lobe(i).g());
+    if (phase.plain()) continue;
+    hasher.number(phase.lobe(i).alpha());
+    hasher.number(phase.weight(i));
+  }
+}
+
 bool isGrey(const Rgb& c) {
   return c.x == c.y && c.y == c.z;
 }
@@ -46,7 +56,7 @@ Medium::Medium(std::vector<MediumVolume> volumes) : m_volumes(std::move(volumes)
     if (!v.emission.field.empty()) emitting.push_back(&v.emission);
     int phaseIndex = 0;
     while (phaseIndex < static_cast<int>(m_phases.size()) &&
-           m_phases[static_cast<std::size_t>(phaseIndex)].g() != v.phase.g())
+           !(m_phases[static_cast<std::size_t>(phaseIndex)] == v.phase))
       ++phaseIndex;
     if (phaseIndex == static_cast<int>(m_phases.size())) m_phases.push_back(v.phase);
     m_placed.push_back(place(v.density, v.localFromNode, v.densityScale, phaseIndex));
@@ -63,7 +73,7 @@ Medium::Medium(std::vector<MediumVolume> volumes) : m_volumes(std::move(volumes)
 
     hasher.number(v.densityScale);
     hasher.numbers(&v.albedo.x, 3);
-    hasher.number(v.phase.g());
+    hashPhase(hasher, v.phase);
     hashField(hasher, v.density, v.localFromNode);
     for (const auto& field : v.albedoFields)
       hashField(hasher, field, v.localFromAlbedoNode);
@@ -73,7 +83,7 @@ Medium::Medium(std::vector<MediumVolume> volumes) : m_volumes(std::move(volumes)
         fmt::format("the volumes mix {} different phase functions; at most {} are served",
                     m_phases.size(), kMaxPhases));
   m_uniformAlbedo = m_volumes.size() == 1 && m_albedo.front().fields.empty();
-  if (m_phases.empty()) m_phases.emplace_back(0.0);
+  if (m_phases.empty()) m_phases.emplace_back();
   if (!emitting.empty()) {
     m_emission = std::make_unique<Emission>(emitting);
     m_emission->hash(hasher);

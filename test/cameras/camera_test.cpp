@@ -35,7 +35,7 @@ double rigidError(const Mat4d& m) {
 }
 
 Vec2d project(const Camera& camera, const Vec3d& p) {
-  const glm::dvec4 h = camera.ndcFromWorld() * glm::dvec4(p, 1);
+  const glm::dvec4 h = camera.ndcFromWorld().value() * glm::dvec4(p, 1);
   return Vec2d(h) / h.w;
 }
 
@@ -158,6 +158,32 @@ TEST(Options, AreCheckedAndUnservedOnesRefused) {
   EXPECT_THROW(makeCamera("perspective", {{"width", "3"}}, place), ConfigError);
   EXPECT_THROW(makeCamera("orthographic", {{"width", "0"}}, place), ConfigError);
   EXPECT_THROW(makeCamera("orthographic", {}, place, {0, 5}), ConfigError);
+}
+
+// Ahead in the middle, right a quarter of the width on, up at the top, behind at both sides.
+TEST(Panorama, SeesEveryDirectionOnce) {
+  const Mat4d place = lookAt({1, 2, 3}, {1, 7, 3}, {0, 0, 1});
+  const auto camera = makeCamera("equirectangular", {}, place, {400, 200});
+  const auto expect = [&](const Vec2d& raster, const Vec3d& direction) {
+    const CameraRay ray = camera->ray(raster);
+    EXPECT_LT(glm::length(ray.direction - direction), 1e-12) << raster.x << ' ' << raster.y;
+    EXPECT_EQ(ray.origin, Vec3d(1, 2, 3));
+  };
+  expect({200, 100}, {0, 1, 0});
+  expect({300, 100}, {1, 0, 0});
+  expect({100, 100}, {-1, 0, 0});
+  expect({0, 100}, {0, -1, 0});
+  expect({400, 100}, {0, -1, 0});
+  expect({123, 0}, {0, 0, 1});
+  expect({321, 200}, {0, 0, -1});
+  // Over the pole: the other side of it.
+  EXPECT_LT(glm::length(camera->ray({50, -10}).direction - camera->ray({250, 10}).direction),
+            1e-12);
+  EXPECT_TRUE(camera->isPanorama());
+  EXPECT_TRUE(camera->hasEye());
+  EXPECT_FALSE(camera->ndcFromWorld());
+  const auto later = makeCamera("equirectangular", {{"near", "2"}}, place, {400, 200});
+  EXPECT_LT(glm::length(later->ray({300, 100}).origin - Vec3d(3, 2, 3)), 1e-12);
 }
 
 }  // namespace

@@ -222,5 +222,58 @@ TEST(Options, OnlyWithoutExtentIsDelta) {
   }
 }
 
+// Irradiance behind a disc's axis and before a ball, at any distance: the textbook's closed forms.
+TEST(AreaLights, IlluminateAsTheClosedFormsSay) {
+  const auto mean = [](const Light& light, const Vec3f& p, const Vec3d& normal) {
+    double sum = 0;
+    constexpr int n = 200;
+    for (int i = 0; i < n * n; ++i) {
+      const Illumination in = light.illuminate(
+          p, {(static_cast<float>(i % n) + 0.5f) / n, (static_cast<float>(i / n) + 0.5f) / n});
+      sum += static_cast<double>(in.irradiance.g) *
+             std::max(0.0, -glm::dot(Vec3d(in.direction), normal)) / (n * n);
+    }
+    return sum;
+  };
+  for (const double d : {0.5, 1.0, 3.0, 40.0}) {
+    const double sine2 = 1 / (1 + d * d);  // of the half angle of a disc of radius 1
+    const auto disk = makeLight(
+        "disk",
+        {{"position", "[0, 0, 0]"}, {"target", "[0, 0, 1]"}, {"radius", "1"}, {"intensity", "2"}});
+    EXPECT_NEAR(mean(*disk, Vec3f(0, 0, d), {0, 0, -1}) / (2 * kPi * sine2), 1, 2e-4) << d;
+    EXPECT_EQ(mean(*disk, Vec3f(0, 0, -d), {0, 0, 1}), 0) << "it shines to one side";
+    const auto ball =
+        makeLight("sphere", {{"position", "[0, 0, 0]"}, {"radius", "1"}, {"intensity", "2"}});
+    EXPECT_NEAR(mean(*ball, Vec3f(0, 0, 1 + d), {0, 0, -1}) / (2 * kPi / ((1 + d) * (1 + d))), 1,
+                2e-4)
+        << d;
+    const Illumination in = ball->illuminate(Vec3f(0, 0, 1 + d), {0.0f, 0.5f});
+    EXPECT_NEAR(static_cast<double>(in.distance), d, 1e-6 * (1 + d)) << "to the surface";
+  }
+  EXPECT_EQ(makeLight("sphere", {{"position", "[0, 0, 0]"}, {"radius", "1"}})
+                ->illuminate({0.2f, 0, 0}, {0.3f, 0.4f})
+                .irradiance.g,
+            0.0f)
+      << "dark inside";
+}
+
+TEST(AreaLights, ARectLiesLevel) {
+  const auto light =
+      makeLight("rect", {{"position", "[0, 5, 0]"}, {"target", "[0, 5, 1]"}, {"size", "[4, 2]"}});
+  const BoundingSphere far{{0, 5, 1000}, 1};
+  Vec3d low(1e9), high(-1e9);
+  for (int i = 0; i < 100; ++i) {
+    const float a = (static_cast<float>(i % 10) + 0.5f) / 10,
+                b = (static_cast<float>(i / 10) + 0.5f) / 10;
+    const Emission photon = light->emit({{0, 5, 20}, 1}, {a, b, 0.5f, 0.5f});
+    low = glm::min(low, photon.origin);
+    high = glm::max(high, photon.origin);
+  }
+  EXPECT_NEAR(high.x - low.x, 4 * 0.9, 1e-5);
+  EXPECT_NEAR(high.y - low.y, 2 * 0.9, 1e-5);
+  EXPECT_NEAR(high.z, low.z, 1e-9);
+  EXPECT_NEAR(static_cast<double>(light->power(far).g), 8 * kPi / 1e6, 1e-3 * 8 * kPi / 1e6);
+}
+
 }  // namespace
 }  // namespace photosphere::lights

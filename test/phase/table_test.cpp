@@ -12,8 +12,8 @@ namespace {
 TEST(PhaseTable, CreatesEveryModelWithItsDefaults) {
   for (const PhasePlugin* plugin : phaseFunctions()) {
     EXPECT_FALSE(plugin->help.empty()) << plugin->name;
-    const HenyeyGreenstein phase = plugin->create(ParamValues(plugin->params));
-    EXPECT_NEAR(phase.maximum(), 1 / (4 * kPi), 1e-8) << plugin->name;
+    const PhaseFunction phase = plugin->create(ParamValues(plugin->params));
+    EXPECT_GT(phase.maximum(), 1 / (4 * kPi) - 1e-8) << plugin->name;
   }
 }
 
@@ -22,7 +22,7 @@ TEST(PhaseTable, TakesTheMeanCosineFromTheScene) {
       findPlugin(phaseFunctions(), "henyey_greenstein", "phase function", "scene.toml:1");
   ParamValues values(plugin.params);
   values.set("g", -0.25, "scene.toml:2");
-  EXPECT_EQ(plugin.create(values).g(), -0.25);
+  EXPECT_EQ(plugin.create(values).plain()->g(), -0.25);
   EXPECT_THROW(values.set("g", 1.25, "scene.toml:2"), ConfigError);
   values.set("g", 1.0, "scene.toml:2");
   EXPECT_THROW(plugin.create(values), ConfigError);
@@ -33,7 +33,10 @@ TEST(PhaseTable, ListsTheKnownModelsForAnUnknownName) {
     findPlugin(phaseFunctions(), "mie", "phase function", "scene.toml:7");
     FAIL() << "accepted an unknown phase function";
   } catch (const ConfigError& error) {
-    EXPECT_NE(std::string(error.what()).find("isotropic, henyey_greenstein"), std::string::npos);
+    EXPECT_NE(std::string(error.what())
+                  .find("isotropic, henyey_greenstein, double_henyey_greenstein, rayleigh, draine, "
+                        "mie_fog"),
+              std::string::npos);
   }
 }
 

@@ -2,6 +2,7 @@
 // Cameras: the table of models and the rays they make.
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <string_view>
 
@@ -33,8 +34,12 @@ class Camera {
   /// RenderMan's worldToCamera: left-handed camera space, +Z forward, column vectors (the EXR
   /// attribute holds its transpose, as OpenEXR's row vectors want).
   virtual Mat4d cameraFromWorld() const = 0;
+  /// True for a camera around which the picture goes: depth is then the distance from the eye, not
+  /// along an axis.
+  virtual bool isPanorama() const { return false; }
   /// RenderMan's worldToNDC: (0,0) upper left, (1,1) lower right after the homogeneous division.
-  virtual Mat4d ndcFromWorld() const = 0;
+  /// Nothing for a panorama, which no matrix projects.
+  virtual std::optional<Mat4d> ndcFromWorld() const { return std::nullopt; }
   virtual Vec2i resolution() const = 0;
 };
 

@@ -45,9 +45,10 @@ struct PhotonColumns {
 
 /// A phase function as sums over photons read it.
 struct Lobe {
-  phase::HenyeyGreenstein phase;
+  phase::PhaseFunction phase;
   /// The phase function averaged over the lobe that direction smoothing makes of a photon: the
-  /// convolution of both (eq. 8 on photons). Replaces `phase` where there is one.
+  /// convolution of both (eq. 8 on photons). Replaces `phase` where there is one; a phase function
+  /// that is not one Henyey-Greenstein lobe always has it, as a table that is quick to read.
   std::shared_ptr<const sphere::ZonalTable> smoothed;
 
   float evaluate(const Vec3f& wi, const Vec3f& wo) const {

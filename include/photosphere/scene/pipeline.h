@@ -59,7 +59,8 @@ struct FrameResult {
   FrameStatistics statistics;
   std::vector<Rgb> error;               ///< standard error of `beauty`, where it is estimated
   std::vector<std::string> layerNames;  ///< layers this frame has, by their names in output.aovs
-  Mat4d cameraFromWorld{1.0}, ndcFromWorld{1.0};
+  Mat4d cameraFromWorld{1.0};
+  std::optional<Mat4d> ndcFromWorld;  ///< nothing for a panorama
   double framesPerSecond = 24;
   std::string estimator;  ///< estimator.type
   std::string layout;     ///< one line: how light is stored; empty where none is

@@ -27,7 +27,7 @@ struct MediumVolume {
   Rgb albedo{0.9f};           ///< used where no albedo grid is given
   std::vector<volume::BrickField<float>> albedoFields;  ///< none, one (grey) or three
   Mat4d localFromAlbedoNode{1.0};
-  phase::HenyeyGreenstein phase{0.0};
+  phase::PhaseFunction phase;
   VolumeEmission emission;  ///< its field is empty where the volume does not emit
 };
 
@@ -83,7 +83,7 @@ class Medium {
     return m_uniformAlbedo ? &m_albedo.front().constant : nullptr;
   }
   /// Distinct phase functions, in order of first use.
-  const std::vector<phase::HenyeyGreenstein>& phases() const { return m_phases; }
+  const std::vector<phase::PhaseFunction>& phases() const { return m_phases; }
   const volume::MajorantGrid& majorants() const { return m_majorants; }
   /// Light that the medium gives off; nullptr when it gives off none.
   const Emission* emission() const { return m_emission.get(); }
@@ -127,7 +127,7 @@ class Medium {
   std::vector<MediumVolume> m_volumes;
   std::vector<Placed> m_placed;
   std::vector<Albedo> m_albedo;
-  std::vector<phase::HenyeyGreenstein> m_phases;
+  std::vector<phase::PhaseFunction> m_phases;
   std::unique_ptr<Emission> m_emission;
   volume::MajorantGrid m_majorants;
   double m_voxelEdge = 1.0;

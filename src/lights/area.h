@@ -1,0 +1,100 @@
+#pragma once
+// What lamps with a surface share: the power of its points toward the smoke.
+
+#include "cone.h"
+#include "rows.h"
+#include "trigonometry.h"
+
+namespace photosphere::lights {
+
+/// Integral of max(0, cos) to a surface normal over a cone of directions [sr], between 0 and pi.
+/// The horizon may cut the cone: Snyder 1996, "Area light sources for real-time graphics", as in
+/// Lagarde & de Rousiers 2014, listing 11.
+/// @param normal  unit
+inline double projectedSolidAngle(const Vec3d& normal, const Cone& cone) {
+  if (cone.oneMinusCos >= 2.0) return kPi;
+  const double cosine = glm::clamp(glm::dot(normal, cone.axis), -1.0, 1.0);
+  const double sineSquared = cone.oneMinusCos * (2 - cone.oneMinusCos);  // of the half angle
+  if (cosine * cosine > sineSquared) return kPi * sineSquared * std::max(0.0, cosine);
+  const double sine = std::sqrt(std::max(0.0, 1 - cosine * cosine));
+  const double x = std::sqrt(std::max(1e-300, 1 / sineSquared - 1));
+  const double y = glm::clamp(-x * (cosine / sine), -1.0, 1.0);
+  const double z = sine * std::sqrt(std::max(0.0, 1 - y * y));
+  const double arctangent = exactAsin((z / x) / std::sqrt(1 + (z / x) * (z / x)));
+  return (cosine * exactAcos(y) - x * z) * sineSquared + arctangent;
+}
+
+/// A photon direction from a point of a surface toward the sphere, and what its power is multiplied
+/// by [sr]. From inside the sphere it falls off with the cosine, from outside it fills the cone.
+struct Departure {
+  Vec3d direction{0.0};
+  double weight = 0;
+};
+inline Departure departure(const Vec3d& from, const Vec3d& normal, const BoundingSphere& bounds,
+                           float u, float turns) {
+  const Cone cone = coneToward(from, bounds);
+  if (cone.oneMinusCos >= 2.0) {
+    // 1 - cos with density proportional to cos.
+    const double h = 1 - std::sqrt(1 - static_cast<double>(u));
+    return {directionInCone(normal, h, turns), kPi};
+  }
+  const Vec3d direction =
+      directionInCone(cone.axis, static_cast<double>(u) * cone.oneMinusCos, turns);
+  return {direction, std::max(0.0, glm::dot(direction, normal)) * cone.solidAngle()};
+}
+
+/// Points along one side of a surface, for the mean of its points' power.
+inline constexpr int kSurfaceNodes = 48;
+
+/// A flat lamp that shines to one side.
+class FlatLight : public Light {
+ public:
+  /// @param axis      unit, the side it shines to; @param radiance  [W m^-2 sr^-1]
+  FlatLight(const Vec3d& center, const Vec3d& axis, const Rgb& radiance)
+      : m_center(center), m_axis(axis), m_radiance(radiance) {}
+
+  Rgb power(const BoundingSphere& bounds) const override {
+    double sum = 0;
+    for (int i = 0; i < kSurfaceNodes; ++i)
+      for (int j = 0; j < kSurfaceNodes; ++j) {
+        const Vec2f u((static_cast<float>(i) + 0.5f) / kSurfaceNodes,
+                      (static_cast<float>(j) + 0.5f) / kSurfaceNodes);
+        sum += projectedSolidAngle(m_axis, coneToward(m_center + offset(u), bounds));
+      }
+    return m_radiance * static_cast<float>(sum * area() / (kSurfaceNodes * kSurfaceNodes));
+  }
+
+  Emission emit(const BoundingSphere& bounds, const Vec4f& u) const override {
+    const Vec3d from = m_center + offset({u.x, u.y});
+    const Departure d = departure(from, m_axis, bounds, u.z, u.w);
+    return {photonOrigin(from, d.direction, bounds), Vec3f(d.direction),
+            m_radiance * static_cast<float>(d.weight * area())};
+  }
+
+  Illumination illuminate(const Vec3f& point, const Vec2f& u) const override {
+    Vec3d direction;
+    Illumination result = PointSource(m_center + offset(u), m_radiance * static_cast<float>(area()))
+                              .illuminate(point, direction);
+    result.irradiance *= static_cast<float>(std::max(0.0, glm::dot(direction, m_axis)));
+    return result;
+  }
+
+  bool isDelta() const override { return false; }
+  bool isGrey() const override { return isGreyColor(m_radiance); }
+
+ protected:
+  /// From the centre to a point of even density over the surface [m]. @param u  in [0, 1)^2
+  virtual Vec3d offset(const Vec2f& u) const = 0;
+  virtual double area() const = 0;  ///< [m^2]
+
+ private:
+  Vec3d m_center, m_axis;
+  Rgb m_radiance;
+};
+
+/// Rows of a flat lamp.
+constexpr Param radianceRow() {
+  return intensityRow("W m^-2 sr^-1", "radiance where the color is 1");
+}
+
+}  // namespace photosphere::lights

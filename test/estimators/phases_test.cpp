@@ -1,0 +1,73 @@
+// Every phase function in every way to store light, against path tracing.
+
+#include <gtest/gtest.h>
+
+#include "photosphere/phase/phase.h"
+#include "support/frames.h"
+#include "support/support.h"
+
+namespace photosphere::test {
+namespace {
+
+using namespace estimators;
+using phase::Draine;
+using phase::PhaseFunction;
+
+struct Row {
+  const char* name;
+  PhaseFunction phase;
+};
+const Row kRows[] = {
+    {"two lobes", PhaseFunction(Draine(0.7), Draine(-0.6), 0.4)},
+    {"rayleigh", Draine(0.0, 1.0)},
+    {"draine", Draine(0.4, 4.0)},
+    {"fog", PhaseFunction(Draine(0.9), Draine(0.56, 21.0), 0.48)},
+};
+
+void expectClose(const char* name, const char* way, const LayerError& e, double mean,
+                 double relMse) {
+  std::printf("  %-10s %-22s mean %.4f  relMSE %.5f\n", name, way, e.meanRatio, e.relMse);
+  EXPECT_NEAR(e.meanRatio, 1.0, mean) << name << ", " << way;
+  EXPECT_LT(e.relMse, relMse) << name << ", " << way;
+}
+
+TEST(Phases, AgreeWithPathTracing) {
+  if (kSanitized) GTEST_SKIP() << "a mean of many paths, too slow under a sanitizer";
+  for (const Row& row : kRows) {
+    transport::MediumVolume smoke =
+        sampledVolume(1.0, 64, {.albedo = 0.9, .extinction = 40.0}, plumeDensity);
+    smoke.phase = row.phase;
+    const TestScene scene = plumeScene(std::move(smoke), 48);
+    const Truth truth = pathTruth(scene, 128);
+    const auto error = [&](const render::FrameLayers& layers) {
+      EXPECT_EQ(layers.nanSamples + layers.negativeSamples, 0u) << row.name;
+      return truth.errorOf(layers, &render::FrameLayers::multiple);
+    };
+    LightFieldLayout layout;
+    layout.channels = 1;
+    expectClose(row.name, "view", error(renderPhotosphere(scene, layout, 200'000, 5).layers), 0.02,
+                0.02);
+    layout.basis = Basis::histogram;
+    layout.rows = 4;
+    expectClose(row.name, "128 bins", error(renderPhotosphere(scene, layout, 200'000, 5).layers),
+                0.03, 0.03);
+    layout.rows = 1;
+    layout.representative = Representative::mean;
+    expectClose(row.name, "8 mean directions",
+                error(renderPhotosphere(scene, layout, 200'000, 5).layers), 0.15, 0.1);
+    LightFieldLayout harmonics;
+    harmonics.channels = 1;
+    harmonics.basis = Basis::sphericalHarmonics;
+    harmonics.order = 8;
+    expectClose(row.name, "harmonics of order 8",
+                error(renderPhotosphere(scene, harmonics, 200'000, 5).layers), 0.05, 0.05);
+    PhotonMapLayout map;
+    map.channels = 1;
+    map.radius = 0.03;
+    expectClose(row.name, "photon map", error(renderPhotonMap(scene, map, 200'000, 5).layers), 0.1,
+                0.1);
+  }
+}
+
+}  // namespace
+}  // namespace photosphere::test
