@@ -1,7 +1,12 @@
-// Surroundings of one radiance.
+// Surroundings of one radiance, or of a picture.
+
+#include <fmt/format.h>
 
 #include "cone.h"
+#include "environment_map.h"
+#include "photosphere/core/error.h"
 #include "photosphere/core/sampling.h"
+#include "photosphere/image/load.h"
 #include "rows.h"
 
 namespace photosphere::lights::plugins {
@@ -36,18 +41,75 @@ class EnvironmentLight final : public Light {
   Rgb m_radiance;  // [W m^-2 sr^-1]
 };
 
+/// Directions in proportion to the light that comes from there.
+class MappedLight final : public Light {
+ public:
+  explicit MappedLight(EnvironmentMap map) : m_map(std::move(map)) {}
+
+  Rgb power(const BoundingSphere& bounds) const override {
+    return m_map.integral() * crossSection(bounds);
+  }
+
+  Emission emit(const BoundingSphere& bounds, const Vec4f& u) const override {
+    const EnvironmentMap::Sample s = m_map.sample({u.x, u.y});
+    if (!(s.density > 0.0f)) return {bounds.center, Vec3f(0, 0, 1), Rgb(0.0f)};
+    const Vec3f direction = -s.toward;
+    const Vec3d axis = glm::normalize(Vec3d(direction));
+    return {discOrigin(axis, bounds, sampleDisc({u.z, u.w})), direction,
+            s.radiance * (crossSection(bounds) / s.density)};
+  }
+
+  Illumination illuminate(const Vec3f&, const Vec2f& u) const override {
+    const EnvironmentMap::Sample s = m_map.sample(u);
+    if (!(s.density > 0.0f)) return {Vec3f(0, 0, 1), kInfinity, Rgb(0.0f)};
+    return {-s.toward, kInfinity, s.radiance / s.density};
+  }
+
+  Rgb background(const Vec3f& direction) const override { return m_map.radiance(direction); }
+  bool isDelta() const override { return false; }
+  bool surrounds() const override { return true; }
+  bool isGrey() const override { return m_map.isGrey(); }
+  void addContent(Hasher& hasher) const override { m_map.addContent(hasher); }
+
+ private:
+  static float crossSection(const BoundingSphere& bounds) {
+    return static_cast<float>(kPi * bounds.radius * bounds.radius);
+  }
+
+  EnvironmentMap m_map;
+};
+
+constexpr std::size_t kMostPixels = std::size_t{1} << 26;
+
+std::unique_ptr<Light> fromFile(const std::string& path, const Rgb& scale) {
+  image::LoadedImage loaded = image::loadImage(path);
+  if (loaded.image.pixelCount() > kMostPixels)
+    throw ConfigError(
+        fmt::format("{}: {} x {} pixels are more than the 8192 x 8192 that an "
+                    "environment may have; scale it down",
+                    path, loaded.image.width(), loaded.image.height()));
+  if (loaded.colorSpace == "sRGB")
+    throw ConfigError(
+        fmt::format("{}: holds values for a display (sRGB), not light; use an EXR or "
+                    "HDR file with linear values in the rendering space",
+                    path));
+  return std::make_unique<MappedLight>(EnvironmentMap(loaded.image, scale));
+}
+
 constexpr Param params[] = {
     colorRow(),
-    intensityRow("W m^-2 sr^-1", "radiance where the color is 1"),
+    intensityRow("W m^-2 sr^-1", "radiance where the color, or the picture, is 1"),
     {.name = "file",
      .type = ParamType::text,
      .unit = "",
      .defaultText = "",
-     .help = "latitude-longitude image, +Y up; empty = the constant color",
-     .served = false},
+     .help = "latitude-longitude picture with linear values (EXR, HDR), +Y up, +Z in its middle; "
+             "empty = the constant color"},
 };
 
 std::unique_ptr<Light> create(const ParamValues& values, const LocalSpace&) {
+  if (const std::string& file = values.text("file"); !file.empty())
+    return fromFile(file, scaledColor(values));
   return std::make_unique<EnvironmentLight>(scaledColor(values));
 }
 

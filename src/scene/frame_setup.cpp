@@ -121,7 +121,10 @@ void buildLights(const SceneFile& scene, FrameSetup& setup) {
     const lights::LightPlugin& plugin =
         findPlugin(lights::lightModels(), entry.type, "light type", entry.where);
     try {
-      setup.lights.push_back(plugin.create(entry.values, setup.space));
+      ParamValues values = entry.values;
+      if (values.given("file"))
+        values.set("file", scene.resolvePath(values.text("file")), entry.where);
+      setup.lights.push_back(plugin.create(values, setup.space));
     } catch (const ConfigError& error) {
       throw ConfigError(fmt::format("{}: {}", entry.where, error.what()));
     }

@@ -13,13 +13,15 @@ namespace photosphere::scene {
 namespace {
 
 // What light in the cache came from: every lamp but its name, in local space.
-std::string lightHash(const SceneFile& scene) {
+std::string lightHash(const SceneFile& scene, const FrameSetup& setup) {
   Hasher hasher;
+  for (const auto& light : setup.lights)
+    light->addContent(hasher);
   for (const LightEntry& light : scene.lights) {
     if (light.type == "environment" && scene.effects.text("environment") == "off") continue;
     hasher.text(light.type);
     for (const Param& row : light.values.rows())
-      if (row.name != "name") {
+      if (row.name != "name" && row.name != "file") {
         hasher.text(row.name);
         hasher.text(light.values.format(row.name));
       }
@@ -29,7 +31,7 @@ std::string lightHash(const SceneFile& scene) {
 }
 
 estimators::LightCacheKey cacheKey(const SceneFile& scene, const FrameSetup& setup) {
-  return {setup.medium->hash(), lightHash(scene), setup.space};
+  return {setup.medium->hash(), lightHash(scene, setup), setup.space};
 }
 
 // Keys that decided what a cache holds act no more once it is read.

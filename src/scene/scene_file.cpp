@@ -17,7 +17,8 @@ namespace {
 enum class DumpPurpose { file, hash };
 
 bool isPath(std::string_view table, std::string_view key) {
-  return (table == "volume" && key == "file") || (table == "estimator" && key == "cache") ||
+  return ((table == "volume" || table == "light") && key == "file") ||
+         (table == "estimator" && key == "cache") ||
          (table == "output" && (key == "file" || key == "preview"));
 }
 
@@ -71,8 +72,10 @@ class Dumper {
       std::string value = values.format(row.name);
       const bool path = isPath(name, row.name) && !values.text(row.name).empty();
       const bool frames = name == "scene" && row.name == "frames";
-      if ((path || frames) && m_purpose == DumpPurpose::hash) continue;
-      if (path) {
+      // A picture of the surroundings is known by its name alone; smoke has hashes of its own.
+      const bool named = path && name == "light";
+      if (((path && !named) || frames) && m_purpose == DumpPurpose::hash) continue;
+      if (path && m_purpose == DumpPurpose::file) {
         ParamValues absolute = values;
         absolute.set(row.name, m_scene.resolvePath(values.text(row.name)), "dump");
         value = absolute.format(row.name);

@@ -187,12 +187,6 @@ INSTANTIATE_TEST_SUITE_P(Contract, NotServedTest,
                                            "output.deep=deep.exr", "output.light_groups=true",
                                            "effects.motion_blur=on", "effects.depth_of_field=on"));
 
-TEST(SceneFileTest, AnEnvironmentFileIsNotServed) {
-  EXPECT_TRUE(
-      contains(complaint([] { parse("[[light]]\ntype = \"environment\"\nfile = \"sky.exr\"\n"); }),
-               "not served by this version yet"));
-}
-
 TEST(SceneFileTest, NamesThatNobodyKnowsAreNotCalledPromised) {
   for (const char* set : {"light.0.type=lamp", "volume.0.phase={ type = \"mie\" }",
                           "camera.type=fisheye", "estimator.type=magic"}) {

@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 
+#include "photosphere/core/hash.h"
 #include "photosphere/core/param.h"
 #include "photosphere/core/types.h"
 
@@ -73,6 +74,8 @@ class Light {
   }
   /// True when no channel differs from another.
   virtual bool isGrey() const = 0;
+  /// Adds what decides its light and is not among its options: the content of files.
+  virtual void addContent(Hasher& hasher) const { (void)hasher; }
 
  private:
   std::string m_name;

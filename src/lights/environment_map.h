@@ -1,0 +1,48 @@
+#pragma once
+// A picture of the surroundings in latitude and longitude, drawn from in proportion to its light.
+
+#include <vector>
+
+#include "photosphere/image/image.h"
+#include "photosphere/lights/light.h"
+
+namespace photosphere::lights {
+
+/// Directions as OpenEXR's ImfEnvmap has them: +Y up, +Z in the middle of the picture, +X to its
+/// left. Immutable; thread-safe; same bits on every CPU but for `radiance`.
+class EnvironmentMap {
+ public:
+  /// @param image  R, G, B; at most 2^26 pixels. Values below 0 and not finite count as 0.
+  /// @param scale  multiplies it
+  EnvironmentMap(const image::Image& image, const Rgb& scale);
+
+  /// A direction toward the surroundings.
+  struct Sample {
+    Vec3f toward{0.0f};
+    Rgb radiance{0.0f};
+    float density = 0.0f;  ///< [1/sr]; 0 where the map is black
+  };
+  /// @param u  in [0, 1)^2
+  Sample sample(const Vec2f& u) const;
+  /// Bilinear between the middles of pixels. @param toward  unit
+  Rgb radiance(const Vec3f& toward) const;
+  /// Integral of the density's pixels' radiance over all directions [W m^-2].
+  const Rgb& integral() const { return m_integral; }
+  bool isGrey() const { return m_grey; }
+  void addContent(Hasher& hasher) const;
+
+ private:
+  Rgb pixel(int x, int y) const;
+  Rgb between(double x, double y) const;
+
+  int m_width = 0, m_height = 0;
+  std::vector<Rgb> m_pixels;
+  std::vector<double> m_rows;       // cumulative, of rows
+  std::vector<float> m_columns;     // cumulative, of the pixels of each row
+  std::vector<double> m_latitudes;  // cosine of the angle from +Y at the upper edge of each row
+  double m_total = 0;
+  Rgb m_integral{0.0f};
+  bool m_grey = true;
+};
+
+}  // namespace photosphere::lights
