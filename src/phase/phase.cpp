@@ -27,12 +27,12 @@ constexpr double kSmallestG = 1e-4;
 // halving where it would leave the bracket or is slow.
 template <class Function>
 double risingRoot(double low, double high, double x, const Function& f) {
-  for (int i = 0; i < 64 && high - low > 1e-12 * high; ++i) {
+  for (int i = 0; i < 64 && high - low > 1e-15; ++i) {
     const auto [value, slope] = f(x);
     (value > 0 ? high : low) = x;
     const double next = slope > 0 ? x - value / slope : low;
     const bool inside = next > low && next < high;
-    if (inside && std::abs(next - x) <= 1e-13 * std::abs(x)) return next;
+    if (inside && std::abs(next - x) <= 1e-15 + 1e-13 * std::abs(x)) return next;
     x = inside ? next : 0.5 * (low + high);
   }
   return x;
