@@ -34,7 +34,7 @@ class EnvironmentLight final : public Light {
 
   Rgb background(const Vec3f&) const override { return m_radiance; }
   bool isDelta() const override { return false; }
-  bool surrounds() const override { return true; }
+  bool isUniform() const override { return true; }
   bool isGrey() const override { return isGreyColor(m_radiance); }
 
  private:
@@ -67,7 +67,6 @@ class MappedLight final : public Light {
 
   Rgb background(const Vec3f& direction) const override { return m_map.radiance(direction); }
   bool isDelta() const override { return false; }
-  bool surrounds() const override { return true; }
   bool isGrey() const override { return m_map.isGrey(); }
   void addContent(Hasher& hasher) const override { m_map.addContent(hasher); }
 

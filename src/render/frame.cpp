@@ -7,6 +7,7 @@
 
 #include "photosphere/core/parallel.h"
 #include "photosphere/core/progress.h"
+#include "photosphere/core/sampling.h"
 
 namespace photosphere::render {
 
@@ -153,7 +154,8 @@ class FrameLoop {
       Rng rng(m_options.key, RandomStream::camera,
               static_cast<std::uint64_t>(firstSample + s) << 40 | pixel);
       const Vec2d raster = Vec2d(x + 0.5, y + 0.5) + m_offsets[static_cast<std::size_t>(s)];
-      const cameras::CameraRay ray = m_camera.ray(raster);
+      cameras::CameraRay ray = m_camera.ray(raster);
+      if (m_options.lens.radius > 0.0) ray = throughLens(ray, lensPoint(firstSample + s, pixel));
       RayRadiance r = m_integrator.radiance(m_options.space.localFromWorld(ray.origin),
                                             Vec3f(ray.direction), rng, counters);
       if (!m_camera.isPanorama()) r.depth *= static_cast<float>(glm::dot(ray.direction, m_axis));
@@ -164,6 +166,32 @@ class FrameLoop {
       }
       samples[s] = nan ? RayRadiance{} : r;
     }
+  }
+
+  // On the unit disc: samples of a pixel follow the R2 sequence, turned by a random shift of each
+  // pixel.
+  Vec2f lensPoint(int sample, std::uint64_t pixel) const {
+    // No sample has this number.
+    Rng rng(m_options.key, RandomStream::camera, std::uint64_t{0xffffff} << 40 | pixel);
+    Vec2d u = Vec2d(rng.uniform2()) +
+              Vec2d(0.7548776662466927, 0.5698402909980532) * static_cast<double>(sample);
+    u -= glm::floor(u);
+    return sampleDisc(Vec2f(glm::min(u, Vec2d(1.0 - 0x1p-24))));
+  }
+
+  // The ray from a point of the lens to where the ray through its middle meets the plane in focus.
+  cameras::CameraRay throughLens(const cameras::CameraRay& ray, const Vec2f& point) const {
+    const Mat4d& place = m_camera.worldFromCamera();
+    const Vec3d focus = m_camera.position() + ray.direction * (m_options.lens.focusDistance /
+                                                               glm::dot(ray.direction, m_axis));
+    const Vec3d shift =
+        m_options.lens.radius * (glm::normalize(Vec3d(place[0])) * static_cast<double>(point.x) +
+                                 glm::normalize(Vec3d(place[1])) * static_cast<double>(point.y));
+    const Vec3d direction = glm::normalize(focus - (m_camera.position() + shift));
+    // It begins where the other does, at the same distance along the axis.
+    const double near = glm::dot(ray.origin - m_camera.position(), m_axis);
+    return {m_camera.position() + shift + direction * (near / glm::dot(direction, m_axis)),
+            direction};
   }
 
   void report(const IntegratorCounters& counters, const Bad& bad) {

@@ -22,8 +22,8 @@ class PathIntegrator final : public Integrator {
     for (const auto& light : lights) {
       m_backgrounds.push_back(light.get());
       const bool sampled =
-          !light->surrounds() || options.environment == EnvironmentSampling::nextEvent;
-      if (sampled) m_sampled.push_back(light.get());
+          !light->isUniform() || options.environment == EnvironmentSampling::nextEvent;
+      (sampled ? m_sampled : m_escaped).push_back(light.get());
     }
     const lights::BoundingSphere bounds = transport::boundingSphere(medium);
     double sum = 0;
@@ -105,8 +105,7 @@ class PathIntegrator final : public Integrator {
   // Light that the path meets by leaving the smoke after this many scatterings.
   void addEscape(RayRadiance& result, const Rgb& throughput, const Vec3f& d,
                  int scatterings) const {
-    if (scatterings > 0 && m_options.environment == EnvironmentSampling::nextEvent) return;
-    for (const lights::Light* light : m_backgrounds) {
+    for (const lights::Light* light : scatterings == 0 ? m_backgrounds : m_escaped) {
       const Rgb value = throughput * light->background(d);
       if (scatterings == 0)
         result.background += value;
@@ -158,7 +157,8 @@ class PathIntegrator final : public Integrator {
   PathOptions m_options;
   const transport::Emission* m_emission;            // nullptr where there is none
   std::vector<const lights::Light*> m_sampled;      // lamps of next-event estimation
-  std::vector<const lights::Light*> m_backgrounds;  // every lamp: what escaping rays meet
+  std::vector<const lights::Light*> m_backgrounds;  // every lamp: what unscattered rays meet
+  std::vector<const lights::Light*> m_escaped;      // what scattered rays meet by leaving
   std::vector<double> m_cumulative;
 };
 

@@ -114,6 +114,7 @@ render::FrameOptions frameOptions(const SceneFile& scene, const render::Crop& cr
   options.filterWidth = scene.render.real("filter_width");
   options.crop = crop;
   options.space = setup.space;
+  options.lens = setup.lens;
   return options;
 }
 

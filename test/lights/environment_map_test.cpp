@@ -125,7 +125,7 @@ TEST_F(Sky, LiesAsOpenExrSays) {
   EXPECT_NEAR(map->background(Vec3f(glm::normalize(Vec3d(0.05, 1, 0.05)))).b, 1, 1e-5);
   EXPECT_EQ(map->background({0, 0, -1}), Rgb(0.0f));
   EXPECT_FALSE(map->isGrey());
-  EXPECT_TRUE(map->surrounds());
+  EXPECT_FALSE(map->isUniform());
 }
 
 TEST_F(Sky, IsHashedByItsPixels) {

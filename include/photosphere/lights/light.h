@@ -65,8 +65,9 @@ class Light {
   virtual Illumination illuminate(const Vec3f& point, const Vec2f& u) const = 0;
   /// True for a light without extent or spread of directions: `illuminate` is exact.
   virtual bool isDelta() const = 0;
-  /// True for a light that rays meet by leaving the scene: `background` is not zero.
-  virtual bool surrounds() const { return false; }
+  /// True for surroundings of one radiance, which rays that leave the scene meet without noise;
+  /// other lights are better sampled by `illuminate`.
+  virtual bool isUniform() const { return false; }
   /// Radiance that a ray which leaves the scene in `direction` meets [W m^-2 sr^-1].
   virtual Rgb background(const Vec3f& direction) const {
     (void)direction;

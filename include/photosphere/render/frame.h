@@ -19,6 +19,12 @@ struct Crop {
   Vec2i min{0}, max{0};
 };
 
+/// A thin lens. @see cameras::Camera::ray for the rays through its middle
+struct Lens {
+  double radius = 0.0;         ///< [scene units]; 0 = a pinhole
+  double focusDistance = 1.0;  ///< of the plane in focus, along the camera's axis [scene units]
+};
+
 struct FrameOptions {
   int samples = 4;      ///< camera samples a pixel
   int firstSample = 0;  ///< of the pixel's sequence of samples: passes of a frame continue it
@@ -27,6 +33,7 @@ struct FrameOptions {
   Crop crop;
   RandomKey key;
   lights::LocalSpace space;  ///< camera rays are in world space
+  Lens lens;                 ///< of a perspective camera
 };
 
 /// Layers of a frame over its crop, row by row from the top, RGB interleaved as Rgb.

@@ -53,9 +53,9 @@ class Integrator {
                                IntegratorCounters& counters) const = 0;
 };
 
-/// How path tracing meets the light of an environment.
+/// How path tracing meets the light of uniform surroundings.
 enum class EnvironmentSampling {
-  escape,     ///< by rays that leave the smoke; exact for uniform surroundings
+  escape,     ///< by rays that leave the smoke: exact
   nextEvent,  ///< by sampling a direction at every collision
 };
 

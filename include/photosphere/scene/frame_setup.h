@@ -14,6 +14,7 @@
 #include "photosphere/estimators/light_field.h"
 #include "photosphere/estimators/photon_map.h"
 #include "photosphere/lights/light.h"
+#include "photosphere/render/frame.h"
 #include "photosphere/scene/scene_file.h"
 #include "photosphere/transport/medium.h"
 #include "photosphere/transport/photon_tracer.h"
@@ -44,6 +45,7 @@ struct FrameSetup {
   transport::LightList lights;
   std::unique_ptr<cameras::Camera> camera;
   estimators::View view;
+  render::Lens lens;  ///< of radius 0 where depth of field is off
   /// Local space [m], in the order in which a point grid gives them back; carrier = "particles"
   /// alone.
   std::vector<Vec3f> particles;
