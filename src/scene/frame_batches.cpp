@@ -64,6 +64,9 @@ struct PassLight {
   Source wider;  // the same photons through a wider kernel, where that is asked for
 };
 
+// Share of the squared target that noise and doubt may have in an estimate that stands.
+constexpr double kSettled = 0.1;
+
 // How much wider.
 constexpr double kWidening = 1.5;
 
@@ -261,10 +264,18 @@ class FrameLoop {
     if (m_checked && m_error.truths() < m_setup.batches) return false;
     if (!(m_target > 0)) return true;
     const ErrorEstimate e = m_estimate = m_error.estimate();
-    if (e.bound() <= m_target) return true;
+    if (met(e)) return true;
     // Photons do not mend a bias that is beyond doubt.
     const double sure = e.bias * e.bias - 2 * e.doubt * e.doubt;
-    return sure >= m_target * m_target && e.noise < 0.5 * e.bias;
+    return (sure >= m_target * m_target && e.noise < 0.5 * e.bias) || settled(e);
+  }
+
+  // More batches and truths would change the estimate by little.
+  bool settled(const ErrorEstimate& e) const {
+    return e.noise * e.noise + e.doubt * e.doubt <= kSettled * m_target * m_target;
+  }
+  bool met(const ErrorEstimate& e) const {
+    return e.bound() <= m_target || (settled(e) && e.total() <= m_target);
   }
 
   void reportError() {
@@ -285,7 +296,7 @@ class FrameLoop {
     s.error = m_error.estimate();
     m_result.error = m_error.standardError();
     m_result.layerNames.emplace_back("error");
-    if (tooFew || !(m_target > 0) || s.error->bound() <= m_target) return;
+    if (tooFew || !(m_target > 0) || met(*s.error)) return;
     s.targetMissed = true;
     m_setup.notes.push_back(fmt::format(
         "the estimated error {:.4g} (noise {:.4g}, bias {:.4g}, unsure by {:.4g}) misses "

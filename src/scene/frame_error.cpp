@@ -57,6 +57,9 @@ std::vector<Rgb> softened(const std::vector<Rgb>& values, int width) {
   return out;
 }
 
+// Noise of the truths, as relMSE, that what errors are divided by may hold.
+constexpr double kQuietTruth = 0.03;
+
 // Index of the block of the given level that holds pixel i.
 std::size_t blockOf(std::size_t i, int width, int columns, std::size_t level) {
   const int x = static_cast<int>(i) % width >> level, y = static_cast<int>(i) / width >> level;
@@ -136,56 +139,84 @@ FrameError::Pyramid FrameError::allFrames() const {
   return all;
 }
 
-// The best guess at the true frame, and what squared errors are divided by: guess^2 + (0.1 mean)^2.
-struct FrameError::Guess {
-  std::vector<Vec3d> scale;        // by pixel
-  std::vector<Vec3d> blockScales;  // means over the blocks of a level
-  std::vector<double> counts;      // pixels of each
-  double values = 0;               // of the frame: its pixels times three channels
+// What squared errors are divided by, guess^2 + (0.1 mean guess)^2, pixel by pixel or block by
+// block.
+struct FrameError::Scale {
+  std::vector<Vec3d> values;
+  std::vector<double> counts;  // pixels of each
+  double pixels = 0;           // of the frame
+  // Mean over the frame's pixels and channels.
+  double mean(const std::vector<Vec3d>& squares) const {
+    double sum = 0;
+    for (std::size_t i = 0; i < values.size(); ++i)
+      sum += counts[i] * sumOf(squares[i] / values[i]);
+    return sum / (3.0 * pixels);
+  }
 };
 
-// The frame, moved by what the truths say of each block, softened: noise in what is divided by
-// makes errors look larger.
-FrameError::Guess FrameError::guess(const Pyramid& frames, std::size_t level) const {
+// By the frame, moved by what the truths say of each block, softened.
+FrameError::Scale FrameError::scaleBy(const Pyramid& frames, std::size_t level) const {
   const std::vector<Rgb>& mean = frames.levels[0].mean;
   const Moments& blocks = frames.levels[level];
-  std::vector<Vec3d> guess(mean.begin(), mean.end());
   std::vector<Rgb> correction(blocks.mean.size(), Rgb(0.0f));
   if (m_truths.count > 0) {
     for (std::size_t b = 0; b < correction.size(); ++b)
       correction[b] = m_truths.levels[level].mean[b] - blocks.mean[b];
     correction = softened(correction, blocks.width);
   }
+  Scale out;
+  out.pixels = static_cast<double>(mean.size());
+  out.counts.resize(mean.size(), 1.0);
   double average = 0;
-  for (std::size_t i = 0; i < guess.size(); ++i) {
-    guess[i] += Vec3d(correction[blockOf(i, m_width, blocks.width, level)]);
-    average += sumOf(guess[i]) / (3.0 * static_cast<double>(guess.size()));
+  for (std::size_t i = 0; i < mean.size(); ++i) {
+    const Vec3d guess(mean[i] + correction[blockOf(i, m_width, blocks.width, level)]);
+    average += sumOf(guess) / (3.0 * out.pixels);
+    out.values.push_back(guess * guess);
   }
-  Guess out;
-  out.values = 3.0 * static_cast<double>(guess.size());
-  out.blockScales.resize(blocks.mean.size(), Vec3d(0.0));
-  out.counts.resize(blocks.mean.size(), 0.0);
-  for (std::size_t i = 0; i < guess.size(); ++i) {
-    out.scale.push_back(guess[i] * guess[i] + 0.01 * average * average);
-    const std::size_t b = blockOf(i, m_width, blocks.width, level);
-    out.blockScales[b] += out.scale[i];
-    ++out.counts[b];
-  }
-  for (std::size_t b = 0; b < out.counts.size(); ++b)
-    out.blockScales[b] /= out.counts[b];
+  for (Vec3d& value : out.values)
+    value += 0.01 * average * average;
   return out;
 }
 
-double FrameError::noiseSquared(const Pyramid& frames, const Guess& guess) const {
-  double sum = 0;
-  for (std::size_t i = 0; i < guess.scale.size(); ++i)
-    sum += sumOf(frames.varianceOfMean(0, i) / guess.scale[i]);
-  return sum / guess.values;
+// Means over the blocks of a level.
+FrameError::Scale FrameError::blockScale(const Scale& pixels, std::size_t level) const {
+  const int columns = m_truths.levels[level].width;
+  Scale out;
+  out.pixels = pixels.pixels;
+  out.values.resize(m_truths.levels[level].mean.size(), Vec3d(0.0));
+  out.counts.resize(out.values.size(), 0.0);
+  for (std::size_t i = 0; i < pixels.values.size(); ++i) {
+    const std::size_t b = blockOf(i, m_width, columns, level);
+    out.values[b] += pixels.values[i];
+    ++out.counts[b];
+  }
+  for (std::size_t b = 0; b < out.values.size(); ++b)
+    out.values[b] /= out.counts[b];
+  return out;
+}
+
+double FrameError::truthNoise(const Scale& scale, std::size_t level) const {
+  std::vector<Vec3d> variances(scale.values.size());
+  for (std::size_t b = 0; b < variances.size(); ++b)
+    variances[b] = m_truths.varianceOfMean(level, b);
+  return scale.mean(variances);
+}
+
+// With blocks of a size at which the truths have little noise: where they are noisy, a pixel that
+// no bright path hit looks dark and sure of it, and its error large.
+FrameError::Scale FrameError::scaleOf(const Pyramid& frames) const {
+  Scale scale;
+  for (std::size_t level = 0; level < frames.levels.size(); ++level) {
+    scale = scaleBy(frames, level);
+    if (m_truths.count < 2) break;
+    if (truthNoise(blockScale(scale, level), level) <= kQuietTruth) break;
+  }
+  return scale;
 }
 
 // Without truths, each half of the batches is the guess for the other's noise: a pixel that a rare
 // bright path hit is bright and noisy at once, and would hide its noise by its own brightness.
-// Softened as above.
+// Softened, as noise in what is divided by makes errors look larger.
 double FrameError::noiseByHalves() const {
   const Pyramid &a = m_frames[0], &b = m_frames[1];
   if (b.count == 0) return 0;
@@ -211,39 +242,37 @@ double FrameError::noiseByHalves() const {
 
 // What the wider kernel says of the bias within blocks: all of it less that of the blocks' means.
 // The square of a noisy mean is too large by its variance.
-double FrameError::widening(const Guess& guess, std::size_t level) const {
+double FrameError::widening(const Scale& pixels, const Scale& blocks, std::size_t level) const {
   if (m_wider.count == 0) return 0;
-  const auto squared = [&](std::size_t at, std::size_t i) {
-    const Vec3d mean(m_wider.levels[at].mean[i]);
-    return mean * mean - m_wider.varianceOfMean(at, i);
+  const auto squares = [&](std::size_t at) {
+    std::vector<Vec3d> out;
+    for (std::size_t i = 0; i < m_wider.levels[at].mean.size(); ++i) {
+      const Vec3d mean(m_wider.levels[at].mean[i]);
+      out.push_back(mean * mean - m_wider.varianceOfMean(at, i));
+    }
+    return out;
   };
-  double sum = 0;
-  for (std::size_t i = 0; i < guess.scale.size(); ++i)
-    sum += sumOf(squared(0, i) / guess.scale[i]);
-  if (m_truths.count > 1)
-    for (std::size_t b = 0; b < guess.counts.size(); ++b)
-      sum -= guess.counts[b] * sumOf(squared(level, b) / guess.blockScales[b]);
-  return std::max(0.0, sum / guess.values);
+  const double all = pixels.mean(squares(0));
+  return std::max(0.0, m_truths.count > 1 ? all - blocks.mean(squares(level)) : all);
 }
 
 // The bias of the blocks' means: the squared difference of two noisy means, less its variance. The
 // standard error takes differences for normally distributed, and noise to be common to channels.
-void FrameError::judge(const Pyramid& frames, const Guess& guess, std::size_t level, double& bias,
+void FrameError::judge(const Pyramid& frames, const Scale& blocks, std::size_t level, double& bias,
                        double& standardError) const {
-  bias = standardError = 0;
-  if (m_truths.count < 2) return;
-  for (std::size_t b = 0; b < guess.counts.size(); ++b) {
+  std::vector<Vec3d> squares;
+  double sum = 0;
+  for (std::size_t b = 0; b < blocks.values.size(); ++b) {
     const Vec3d difference =
         Vec3d(frames.levels[level].mean[b]) - Vec3d(m_truths.levels[level].mean[b]);
     const Vec3d variance = frames.varianceOfMean(level, b) + m_truths.varianceOfMean(level, b);
-    const Vec3d squared = difference * difference - variance;
-    bias += guess.counts[b] * sumOf(squared / guess.blockScales[b]);
+    squares.push_back(difference * difference - variance);
     const Vec3d spread =
-        glm::sqrt(2.0 * variance * variance + 4.0 * variance * glm::max(squared, Vec3d(0.0)));
-    standardError += square(guess.counts[b] * sumOf(spread / guess.blockScales[b]));
+        glm::sqrt(2.0 * variance * variance + 4.0 * variance * glm::max(squares[b], Vec3d(0.0)));
+    sum += square(blocks.counts[b] * sumOf(spread / blocks.values[b]));
   }
-  bias /= guess.values;
-  standardError = std::sqrt(standardError) / guess.values;
+  bias = blocks.mean(squares);
+  standardError = std::sqrt(sum) / (3.0 * blocks.pixels);
 }
 
 ErrorEstimate FrameError::estimate() const {
@@ -252,15 +281,23 @@ ErrorEstimate FrameError::estimate() const {
   if (m_truths.count < 2) e.noise = std::sqrt(noiseByHalves());
   if (m_truths.count < 2 && m_wider.count == 0) return e;
   const Pyramid frames = allFrames();
+  const Scale pixels = scaleOf(frames);
+  if (!(sumOf(pixels.values[0]) > 0)) return {};  // black: every scale holds the mean
+  if (m_truths.count < 2) {
+    e.bias = std::sqrt(widening(pixels, pixels, 0));
+    return e;
+  }
+  std::vector<Vec3d> variances(pixels.values.size());
+  for (std::size_t i = 0; i < variances.size(); ++i)
+    variances[i] = frames.varianceOfMean(0, i);
+  e.noise = std::sqrt(pixels.mean(variances));
   for (std::size_t level = 0; level < frames.levels.size(); ++level) {
-    const Guess reference = guess(frames, level);
-    if (!(sumOf(reference.scale[0]) > 0)) return {};  // black: every scale holds the mean
+    const Scale blocks = blockScale(pixels, level);
     double bias = 0, doubt = 0;
-    judge(frames, reference, level, bias, doubt);
-    const double noise = m_truths.count < 2 ? square(e.noise) : noiseSquared(frames, reference);
-    const double all = std::max(0.0, bias + widening(reference, level));
-    e = {std::sqrt(noise), std::sqrt(all), std::sqrt(doubt), m_truths.count < 2 ? 0 : 1 << level};
-    if (doubt <= kDoubtShare * (noise + all)) break;
+    judge(frames, blocks, level, bias, doubt);
+    const double all = std::max(0.0, bias + widening(pixels, blocks, level));
+    e = {e.noise, std::sqrt(all), std::sqrt(doubt), 1 << level};
+    if (doubt <= kDoubtShare * (e.noise * e.noise + all)) break;
   }
   return e;
 }

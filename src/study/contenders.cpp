@@ -68,7 +68,7 @@ const std::vector<Family>& families() {
       {"path_traced", "path tracing", {"estimator.type=path_traced"}, Work::samples},
       {"until_error",
        "photosphere, view, until its estimated error",
-       {"estimator.basis=view", "estimator.photons=200000", "render.time_limit=60"},
+       {"estimator.basis=view", "estimator.photons=200000", "render.time_limit=10"},
        Work::errorTarget},
       {"single", "single scattering alone", {"estimator.type=single"}, Work::none},
   };

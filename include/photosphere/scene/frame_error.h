@@ -62,14 +62,16 @@ class FrameError {
     void add(std::vector<Rgb> values, int width);
     Vec3d varianceOfMean(std::size_t level, std::size_t i) const;
   };
-  struct Guess;
+  struct Scale;
 
   Pyramid allFrames() const;
   double noiseByHalves() const;
-  Guess guess(const Pyramid& frames, std::size_t level) const;
-  double noiseSquared(const Pyramid& frames, const Guess& guess) const;
-  double widening(const Guess& guess, std::size_t level) const;
-  void judge(const Pyramid& frames, const Guess& guess, std::size_t level, double& bias,
+  Scale scaleBy(const Pyramid& frames, std::size_t level) const;
+  Scale scaleOf(const Pyramid& frames) const;
+  Scale blockScale(const Scale& pixels, std::size_t level) const;
+  double truthNoise(const Scale& scale, std::size_t level) const;
+  double widening(const Scale& pixels, const Scale& blocks, std::size_t level) const;
+  void judge(const Pyramid& frames, const Scale& blocks, std::size_t level, double& bias,
              double& standardError) const;
 
   int m_width;
