@@ -21,7 +21,7 @@ HenyeyGreenstein::HenyeyGreenstein(double g) : m_g(g) {
 
 namespace {
 
-constexpr double kSmallestG = 1e-4;
+constexpr double kSmallestG = 1e-3;  // below, sample() would lose digits
 
 // The root of a function that rises from below 0 at `low` to above at `high`: Newton's method, and
 // halving where it would leave the bracket or is slow.

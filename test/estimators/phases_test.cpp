@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "photosphere/phase/phase.h"
 #include "support/frames.h"
 #include "support/support.h"
@@ -16,19 +18,19 @@ using phase::PhaseFunction;
 struct Row {
   const char* name;
   PhaseFunction phase;
+  double noise = 1;  ///< a sharper peak needs more photons for the same noise
 };
 const Row kRows[] = {
     {"two lobes", PhaseFunction(Draine(0.7), Draine(-0.6), 0.4)},
     {"rayleigh", Draine(0.0, 1.0)},
     {"draine", Draine(0.4, 4.0)},
-    {"fog", PhaseFunction(Draine(0.9), Draine(0.56, 21.0), 0.48)},
+    {"as fog", PhaseFunction(Draine(0.8), Draine(0.5, 21.0), 0.48), 5},
 };
 
-void expectClose(const char* name, const char* way, const LayerError& e, double mean,
-                 double relMse) {
+void expectClose(const Row& row, const char* way, const LayerError& e, double mean, double relMse) {
   std::printf("  %-10s %-22s mean %.4f  relMSE %.5f\n", name, way, e.meanRatio, e.relMse);
-  EXPECT_NEAR(e.meanRatio, 1.0, mean) << name << ", " << way;
-  EXPECT_LT(e.relMse, relMse) << name << ", " << way;
+  EXPECT_NEAR(e.meanRatio, 1.0, mean * std::sqrt(row.noise)) << row.name << ", " << way;
+  EXPECT_LT(e.relMse, relMse * row.noise) << row.name << ", " << way;
 }
 
 TEST(Phases, AgreeWithPathTracing) {
@@ -45,27 +47,26 @@ TEST(Phases, AgreeWithPathTracing) {
     };
     LightFieldLayout layout;
     layout.channels = 1;
-    expectClose(row.name, "view", error(renderPhotosphere(scene, layout, 200'000, 5).layers), 0.02,
+    expectClose(row, "view", error(renderPhotosphere(scene, layout, 200'000, 5).layers), 0.02,
                 0.02);
     layout.basis = Basis::histogram;
     layout.rows = 4;
-    expectClose(row.name, "128 bins", error(renderPhotosphere(scene, layout, 200'000, 5).layers),
-                0.03, 0.03);
-    layout.rows = 1;
+    expectClose(row, "128 bins", error(renderPhotosphere(scene, layout, 200'000, 5).layers), 0.03,
+                0.03);
+    layout.rows = 2;
     layout.representative = Representative::mean;
-    expectClose(row.name, "8 mean directions",
+    expectClose(row, "32 mean directions",
                 error(renderPhotosphere(scene, layout, 200'000, 5).layers), 0.15, 0.1);
     LightFieldLayout harmonics;
     harmonics.channels = 1;
     harmonics.basis = Basis::sphericalHarmonics;
     harmonics.order = 8;
-    expectClose(row.name, "harmonics of order 8",
+    expectClose(row, "harmonics of order 8",
                 error(renderPhotosphere(scene, harmonics, 200'000, 5).layers), 0.05, 0.05);
     PhotonMapLayout map;
     map.channels = 1;
     map.radius = 0.03;
-    expectClose(row.name, "photon map", error(renderPhotonMap(scene, map, 200'000, 5).layers), 0.1,
-                0.1);
+    expectClose(row, "photon map", error(renderPhotonMap(scene, map, 200'000, 5).layers), 0.1, 0.1);
   }
 }
 

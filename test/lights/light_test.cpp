@@ -201,7 +201,9 @@ TEST(Options, AreCheckedAndForeignOnesRefused) {
   EXPECT_THROW(makeLight("point", {{"cone_angle", "3"}}), ConfigError);
   EXPECT_THROW(makeLight("point", {{"size", "[1, 1]"}}), ConfigError);
   EXPECT_THROW(makeLight("environment", {{"position", "[1, 1, 1]"}}), ConfigError);
-  EXPECT_THROW(makeLight("environment", {{"file", "sky.exr"}}), ConfigError);
+  EXPECT_THROW(makeLight("rect", {{"size", "[0, 1]"}}), ConfigError);
+  EXPECT_THROW(makeLight("disk", {{"radius", "0"}}), ConfigError);
+  EXPECT_THROW(makeLight("sphere", {{"radius", "-1"}}), ConfigError);
   EXPECT_THROW(makeLight("spot", {{"radius", "0.5"}}), ConfigError);
   EXPECT_THROW(makeLight("spot", {{"cone_angle", "181"}}), ConfigError);
   EXPECT_THROW(makeLight("spot", {{"cone_angle", "0"}}), ConfigError);
@@ -216,7 +218,9 @@ TEST(Options, AreCheckedAndForeignOnesRefused) {
 TEST(Options, OnlyWithoutExtentIsDelta) {
   for (const LightPlugin* plugin : lightModels()) {
     const auto light = makeLight(std::string(plugin->name), {});
-    EXPECT_EQ(light->isDelta(), plugin->name != "environment") << plugin->name;
+    const bool extended = plugin->name == "environment" || plugin->name == "rect" ||
+                          plugin->name == "disk" || plugin->name == "sphere";
+    EXPECT_EQ(light->isDelta(), !extended) << plugin->name;
     EXPECT_TRUE(light->isGrey()) << plugin->name;
     EXPECT_FALSE(plugin->help.empty());
   }

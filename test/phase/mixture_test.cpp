@@ -21,7 +21,8 @@ long double reference(const Draine& lobe, long double c) {
 
 // Its integral over the sphere from the peak's side to t = 1 - s c, by Gauss's rule of 3 nodes in
 // panels that are even in ln(t + c0).
-double cumulative(const Draine& lobe, double t) {
+template <class Weight>
+double integral(const Draine& lobe, double t, const Weight& weightOf) {
   const double side = lobe.g() < 0 ? -1 : 1, c0 = std::pow(1 - std::abs(lobe.g()), 2) / 2 + 1e-9;
   const double low = std::log(c0), width = (std::log(t + c0) - low) / 400;
   double sum = 0;
@@ -29,10 +30,15 @@ double cumulative(const Draine& lobe, double t) {
     for (int k = -1; k <= 1; ++k) {
       const double e = std::exp(low + (i + 0.5 + 0.3872983346207417 * k) * width);
       const double weight = k ? 5.0 / 18 : 8.0 / 18;
-      sum += weight * width * e * 2 * kPi *
-             static_cast<double>(reference(lobe, side * (1 - (e - c0))));
+      const double cosine = side * (1 - (e - c0));
+      sum += weight * width * e * 2 * kPi * weightOf(cosine) *
+             static_cast<double>(reference(lobe, cosine));
     }
   return sum;
+}
+
+double cumulative(const Draine& lobe, double t) {
+  return integral(lobe, t, [](double) { return 1.0; });
 }
 
 struct Shape {
@@ -47,12 +53,7 @@ class DraineLobe : public ::testing::TestWithParam<Shape> {
 TEST_P(DraineLobe, IntegratesToOneAndToItsMeanCosine) {
   const Draine phase = lobe();
   EXPECT_NEAR(cumulative(phase, 2), 1, 1e-6);
-  double moment = 0;
-  const int count = 200'000;
-  for (int i = 0; i < count; ++i) {
-    const double c = -1 + (i + 0.5) * 2 / count;
-    moment += 2 * kPi * 2 / count * c * static_cast<double>(reference(phase, c));
-  }
+  const double moment = integral(phase, 2, [](double cosine) { return cosine; });
   EXPECT_NEAR(moment, phase.meanCosine(), 2e-6);
 }
 
@@ -65,7 +66,12 @@ TEST_P(DraineLobe, MatchesTheClosedFormAndNeverExceedsItsMaximum) {
     const Vec3f wo = i % 2 ? sampleSphere(rng.uniform2()) : phase.sample(wi, rng.uniform2());
     const Vec3d d = glm::normalize(Vec3d(wo)) - side * glm::normalize(Vec3d(wi));
     const long double c = side * (1 - static_cast<long double>(glm::dot(d, d)) / 2);
-    ASSERT_NEAR(phase.evaluate(wi, wo) / static_cast<double>(reference(phase, c)), 1.0, 4e-6) << i;
+    // The cosine has an absolute error of 1e-7, which counts where alpha cos^2 does.
+    const double cosine = static_cast<double>(c), alpha = phase.alpha();
+    const double slope = 2 * alpha * std::abs(cosine) / (1 + alpha * cosine * cosine);
+    ASSERT_NEAR(phase.evaluate(wi, wo) / static_cast<double>(reference(phase, c)), 1.0,
+                4e-6 + 3e-7 * slope)
+        << i;
     ASSERT_LE(phase.evaluate(wi, wo), phase.maximum());
     ASSERT_FLOAT_EQ(phase.evaluate(wi, wo), phase.evaluate(-wo, -wi));
   }
@@ -90,13 +96,13 @@ TEST_P(DraineLobe, SampleInvertsTheCumulativeDistribution) {
 
 INSTANTIATE_TEST_SUITE_P(Phase, DraineLobe,
                          ::testing::Values(Shape{0, 1}, Shape{0, 40}, Shape{1e-5, 1},
-                                           Shape{2e-4, 2}, Shape{0.1, 5}, Shape{0.5, 1},
+                                           Shape{2e-3, 2}, Shape{0.1, 5}, Shape{0.5, 1},
                                            Shape{-0.5, 3}, Shape{0.6, 20}, Shape{0.9, 1},
                                            Shape{0.99, 100}, Shape{0.3, 1e6}));
 
 TEST(Rayleigh, IsTheTextbooks) {
-  const PhaseFunction phase =
-      findPlugin(phaseFunctions(), "rayleigh", "phase", "").create(ParamValues(std::span<const Param>()));
+  const PhaseFunction phase = findPlugin(phaseFunctions(), "rayleigh", "phase", "")
+                                  .create(ParamValues(std::span<const Param>()));
   for (double c = -1; c <= 1; c += 0.125) {
     const Vec3f wo(Vec3d(std::sqrt(1 - c * c), 0, c));
     EXPECT_NEAR(phase.evaluate({0, 0, 1}, wo), 3 / (16 * kPi) * (1 + c * c), 1e-7) << c;

@@ -73,7 +73,7 @@ class HenyeyGreenstein {
 /// every CPU.
 class Draine {
  public:
-  /// A g nearer to 0 than 1e-4 counts as 0 where alpha is not 0.
+  /// A g nearer to 0 than 1e-3 counts as 0 where alpha is not 0.
   /// @throws ConfigError unless -1 < g < 1 and alpha >= 0 is finite
   explicit Draine(double g = 0.0, double alpha = 0.0);
 
