@@ -34,7 +34,7 @@ constexpr std::array<Look, 15> kLooks{{{"#000000", 7, 1},
                                        {"#0050a0", 14, 5},
                                        {"#a03000", 15, 1}}};
 
-// Height of a row of the key, two titles wide [pixels].
+// Height of a row of the key [pixels].
 constexpr int kKeyRow = 18;
 
 std::string dataBlock(std::size_t index, const Curve& curve) {
@@ -95,9 +95,9 @@ std::string errorPlotScript(const std::vector<Curve>& curves, const std::string&
       "set xlabel 'time of a frame [s], median and range of the seeds'\n"
       "set ylabel 'relative error, root of relMSE [1], 95 % interval'\n"
       "set grid xtics ytics lc '#d8d8d8' lw 0.5\n"
-      "set key below maxcols 2 Left reverse noenhanced\nset border lw 1\nset offsets graph 0.05, "
+      "set key below maxcols 1 Left reverse noenhanced\nset border lw 1\nset offsets graph 0.05, "
       "graph 0.05, 0, 0\n",
-      width, height + kKeyRow * static_cast<int>(curves.size() / 2 + 1), gnuplotText(title));
+      width, height + kKeyRow * static_cast<int>(curves.size() + 1), gnuplotText(title));
   text += errorRange(curves) + labels("x") + labels("y");
   text += "plot $front using 1:2 with lines lc '#b0b0b0' lw 5 title 'Pareto front (ringed)', \\\n";
   for (std::size_t i = 0; i < curves.size(); ++i) {
