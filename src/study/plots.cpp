@@ -18,7 +18,7 @@ struct Look {
   int mark, dash;
 };
 // Dark to middle shades that keep apart in grey; marks and dashes tell them apart without colour.
-constexpr std::array<Look, 12> kLooks{{{"#000000", 7, 1},
+constexpr std::array<Look, 15> kLooks{{{"#000000", 7, 1},
                                        {"#0050a0", 5, 2},
                                        {"#a03000", 9, 3},
                                        {"#007050", 11, 4},
@@ -29,7 +29,13 @@ constexpr std::array<Look, 12> kLooks{{{"#000000", 7, 1},
                                        {"#3060c0", 12, 5},
                                        {"#606060", 2, 1},
                                        {"#205020", 1, 2},
-                                       {"#905040", 3, 3}}};
+                                       {"#905040", 3, 3},
+                                       {"#000000", 6, 4},
+                                       {"#0050a0", 14, 5},
+                                       {"#a03000", 15, 1}}};
+
+// Height of a row of the key [pixels].
+constexpr int kKeyRow = 18;
 
 std::string dataBlock(std::size_t index, const Curve& curve) {
   std::string text = fmt::format("$curve{} << EOD\n", index);
@@ -89,9 +95,9 @@ std::string errorPlotScript(const std::vector<Curve>& curves, const std::string&
       "set xlabel 'time of a frame [s], median and range of the seeds'\n"
       "set ylabel 'relative error, root of relMSE [1], 95 % interval'\n"
       "set grid xtics ytics lc '#d8d8d8' lw 0.5\n"
-      "set key outside right top Left reverse noenhanced\nset border lw 1\nset offsets graph 0.05, "
+      "set key below maxcols 1 Left reverse noenhanced\nset border lw 1\nset offsets graph 0.05, "
       "graph 0.05, 0, 0\n",
-      width, height, gnuplotText(title));
+      width, height + kKeyRow * static_cast<int>(curves.size() + 1), gnuplotText(title));
   text += errorRange(curves) + labels("x") + labels("y");
   text += "plot $front using 1:2 with lines lc '#b0b0b0' lw 5 title 'Pareto front (ringed)', \\\n";
   for (std::size_t i = 0; i < curves.size(); ++i) {

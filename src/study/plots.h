@@ -10,7 +10,7 @@ namespace photosphere::study {
 
 /// The gnuplot script of relative error over seconds, both logarithmic. Families differ by mark and
 /// dash as well as by shade, so that a black and white print reads; points of the Pareto front are
-/// ringed.
+/// ringed. @param height  [pixels], without the key below
 std::string errorPlotScript(const std::vector<Curve>& curves, const std::string& title, int width,
                             int height);
 
