@@ -25,6 +25,13 @@ std::array<Slot, 64> slots;
 std::array<struct sigaction, kSignals.size()> previous;
 std::mutex mutex;
 int armedCount = 0;
+char lastRead[1024] = {};  // a file that was read to its end
+
+// OpenVDB 10 writes past a buffer where a damaged file states a length below zero
+// (bloscFromStream). The C library finds that later, when it frees memory, and aborts.
+bool staysArmed(std::size_t signal) {
+  return kSignals[signal] == SIGABRT && previous[signal].sa_handler == SIG_DFL;
+}
 
 void print(const char* text) {
   const ssize_t ignored = write(STDERR_FILENO, text, std::strlen(text));
@@ -33,13 +40,22 @@ void print(const char* text) {
 
 // Async-signal-safe: write, removeTemporaries and _exit only.
 extern "C" void photosphereOnCrash(int) {
+  bool reading = false;
   for (const Slot& slot : slots) {
     if (!slot.armed.load(std::memory_order_relaxed)) continue;
+    reading = true;
     print("photosphere: ");
     print(slot.file);
     print(
         ": the OpenVDB library crashed while reading it: the file is damaged; write or copy it "
         "again\n");
+  }
+  if (!reading) {
+    print("photosphere: ");
+    print(lastRead);
+    print(
+        ": the memory was found damaged after this file, or one before it, was read. The OpenVDB "
+        "library does that with a damaged file: write or copy it again\n");
   }
   removeTemporaries();
   _exit(static_cast<int>(ExitCode::inputInvalid));
@@ -71,16 +87,21 @@ CrashGuard::CrashGuard(const std::filesystem::path& file) : m_stack(1 << 16) {
   action.sa_handler = photosphereOnCrash;
   action.sa_flags = SA_ONSTACK;
   sigfillset(&action.sa_mask);
-  for (std::size_t i = 0; i < kSignals.size(); ++i)
-    sigaction(kSignals[i], &action, &previous[i]);
+  for (std::size_t i = 0; i < kSignals.size(); ++i) {
+    struct sigaction before {};
+    sigaction(kSignals[i], &action, &before);
+    // Left in place by an earlier guard.
+    if (before.sa_handler != photosphereOnCrash) previous[i] = before;
+  }
 }
 
 CrashGuard::~CrashGuard() {
   if (m_slot < 0) return;
   const std::lock_guard<std::mutex> lock(mutex);
+  std::strncpy(lastRead, slots[static_cast<std::size_t>(m_slot)].file, sizeof(lastRead) - 1);
   if (--armedCount == 0)
     for (std::size_t i = 0; i < kSignals.size(); ++i)
-      sigaction(kSignals[i], &previous[i], nullptr);
+      if (!staysArmed(i)) sigaction(kSignals[i], &previous[i], nullptr);
   if (!m_stack.empty()) {
     stack_t off{};
     off.ss_flags = SS_DISABLE;

@@ -9,7 +9,8 @@ namespace photosphere::volume {
 /// While one lives, SIGSEGV, SIGABRT, SIGBUS, SIGFPE and SIGILL print the file's name, remove
 /// temporaries and end the process with exit code 4. OpenVDB's distribution build keeps its asserts
 /// and follows offsets it has read, so a damaged file can raise each of these. Several may live at
-/// a time, on any threads; the last one restores the handlers that were there.
+/// a time, on any threads; the last one restores the handlers that were there, but for SIGABRT
+/// where nobody handled it: memory that the library damaged is found later, and that is said.
 class CrashGuard {
  public:
   explicit CrashGuard(const std::filesystem::path& file);

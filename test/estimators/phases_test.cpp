@@ -28,7 +28,7 @@ const Row kRows[] = {
 };
 
 void expectClose(const Row& row, const char* way, const LayerError& e, double mean, double relMse) {
-  std::printf("  %-10s %-22s mean %.4f  relMSE %.5f\n", name, way, e.meanRatio, e.relMse);
+  std::printf("  %-10s %-22s mean %.4f  relMSE %.5f\n", row.name, way, e.meanRatio, e.relMse);
   EXPECT_NEAR(e.meanRatio, 1.0, mean * std::sqrt(row.noise)) << row.name << ", " << way;
   EXPECT_LT(e.relMse, relMse * row.noise) << row.name << ", " << way;
 }
