@@ -318,12 +318,36 @@ double carrierSpacing(const std::vector<Vec3f>& particles) {
   return set.size() > 1 ? volume::medianSpacing(set) : 0.0;
 }
 
+// Mean cosine of the sharpest lobe, and from where on bins have less error than the view basis
+// (README.md, bases of directions): a photon that happens to fly toward the eye counts alone there,
+// and leaves a bright block.
+constexpr double kSharpLobe = 0.85;
+constexpr int kSharpRows = 4;  // fewer bins than 128 are dark there
+
+double sharpestLobe(const transport::Medium& medium) {
+  double sharpest = 0;
+  for (const phase::PhaseFunction& phase : medium.phases())
+    for (int i = 0; i < phase.lobes(); ++i)
+      sharpest = std::max(sharpest, std::abs(phase.lobe(i).g()));
+  return sharpest;
+}
+
 void buildLayout(const SceneFile& scene, const SetupOptions& options, FrameSetup& setup) {
   using namespace estimators;
   const ParamValues& e = scene.estimator;
   LightFieldLayout& l = setup.layout;
   const bool cached = options.forLightCache || !e.text("cache").empty();
   l = layoutOf(e, cached);
+  if (const double g = sharpestLobe(*setup.medium);
+      e.text("basis") == "auto" && l.basis == Basis::view && g >= kSharpLobe) {
+    l.basis = Basis::histogram;
+    if (!e.given("rows")) l.rows = kSharpRows;
+    if (e.text("type") == "photosphere")
+      setup.notes.push_back(
+          fmt::format("a phase function has a lobe of g = {:.3g}: light is stored in {} bins of "
+                      "direction, as estimator.basis = \"view\" would be noisier",
+                      g, l.bins()));
+  }
   l.channels = setup.effects.chromatic ? 3 : 1;
   l.phases = static_cast<int>(setup.medium->phases().size());
   for (const auto& light : setup.lights)

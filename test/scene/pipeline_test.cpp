@@ -114,6 +114,28 @@ TEST_F(PipelineTest, TwoOverlappingVolumesAddUp) {
   EXPECT_NEAR(meanOf(twice.layers.multiple) / meanOf(once.layers.multiple), 1.0, 0.02);
 }
 
+// A sharp lobe makes bright blocks of single photons in the view basis.
+TEST_F(PipelineTest, ASharpPhaseFunctionIsStoredInBins) {
+  const std::string text = ballScene(ball("a.vdb"), Vec3d(0), 1);
+  const auto layout = [&](std::vector<std::string> sets) {
+    return setUpFrame(scene(text, sets), 1).layout;
+  };
+  using estimators::Basis;
+  EXPECT_EQ(layout({}).basis, Basis::view);
+  EXPECT_EQ(layout({"volume.0.phase={ g = 0.84 }"}).basis, Basis::view);
+  for (const char* phase : {"{ g = 0.85 }", "{ g = -0.9 }", "{ type = \"mie_fog\" }",
+                            "{ type = \"double_henyey_greenstein\", g1 = 0.1, g2 = 0.9 }"}) {
+    const std::string set = std::string("volume.0.phase=") + phase;
+    EXPECT_EQ(layout({set}).basis, Basis::histogram) << phase;
+    EXPECT_EQ(layout({set}).bins(), 128) << phase;
+    EXPECT_EQ(layout({set, "estimator.rows=2"}).bins(), 32) << phase;
+    EXPECT_EQ(layout({set, "estimator.basis=view"}).basis, Basis::view) << phase;
+  }
+  const FrameSetup setup = setUpFrame(scene(text, {"volume.0.phase={ g = 0.9 }"}), 1);
+  ASSERT_FALSE(setup.notes.empty());
+  EXPECT_TRUE(contains(setup.notes.back(), "estimator.basis")) << setup.notes.back();
+}
+
 TEST_F(PipelineTest, AMissingGridListsWhatIsThere) {
   const std::string text = ballScene(ball("g.vdb"), Vec3d(0), 1);
   const std::string message = complaint(
