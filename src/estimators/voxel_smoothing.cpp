@@ -123,7 +123,7 @@ Colours smoothFluence(const transport::Medium& medium, const SupportLattice& lat
   if (layout.smoothing == Smoothing::twicing)
     return sharpened(smoothVoxels(lattice, colours, layout.kernel, layout.radius));
   const std::vector<Tap> taps = kernelTaps(layout.kernel, layout.radius / lattice.edge());
-  const Colours plain = convolve(lattice, colours, taps);
+  Colours plain = convolve(lattice, colours, taps);
   if (layout.smoothing == Smoothing::plain) return plain;
   Colours weighted = densityWeighted(medium, lattice, colours, taps, plain);
   if (layout.smoothing == Smoothing::mean)
