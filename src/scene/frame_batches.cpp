@@ -258,13 +258,17 @@ class FrameLoop {
   std::uint64_t seed() const { return static_cast<std::uint64_t>(m_key.hi) << 32 | m_key.lo; }
   bool once() const { return m_setup.batches == 1 && m_passes == 1; }
 
+  // Fewer parts than the frame is judged by.
+  bool tooFew() const {
+    return m_batches < m_setup.batches || (m_checked && m_error.truths() < m_setup.batches);
+  }
+
   bool done() {
-    if (m_timeLimit > 0 && m_watch.seconds() > m_timeLimit) return true;
-    if (m_batches < m_setup.batches) return false;
-    if (m_checked && m_error.truths() < m_setup.batches) return false;
+    const bool late = m_timeLimit > 0 && m_watch.seconds() > m_timeLimit;
+    if (tooFew()) return late;
     if (!(m_target > 0)) return true;
     const ErrorEstimate e = m_estimate = m_error.estimate();
-    if (met(e)) return true;
+    if (late || met(e)) return true;
     // Photons do not mend a bias that is beyond doubt.
     const double sure = e.bias * e.bias - 2 * e.doubt * e.doubt;
     return (sure >= m_target * m_target && e.noise < 0.5 * e.bias) || settled(e);
@@ -284,19 +288,18 @@ class FrameLoop {
     for (Vec3d* power : {&s.energyEmitted, &s.energyMissed, &s.energyAbsorbed, &s.energyEscaped,
                          &s.energyCapped, &s.energyError})
       *power /= static_cast<double>(m_batches);
-    const bool tooFew = m_target > 0 && (m_batches < m_setup.batches ||
-                                         (m_checked && m_error.truths() < m_setup.batches));
-    s.targetMissed = tooFew;
-    if (tooFew)
+    const bool wanted = m_target > 0;
+    s.targetMissed = wanted && tooFew();
+    if (s.targetMissed)
       m_setup.notes.push_back(fmt::format(
           "render.time_limit ended the frame after {} of the {} parts that its error is judged by; "
           "raise it, or lower estimator.photons",
           m_batches < m_setup.batches ? m_batches : m_error.truths(), m_setup.batches));
     if (m_batches < 2) return;
-    s.error = m_error.estimate();
+    s.error = wanted && !tooFew() ? m_estimate : m_error.estimate();
     m_result.error = m_error.standardError();
     m_result.layerNames.emplace_back("error");
-    if (tooFew || !(m_target > 0) || met(*s.error)) return;
+    if (!wanted || tooFew() || met(*s.error)) return;
     s.targetMissed = true;
     m_setup.notes.push_back(fmt::format(
         "the estimated error {:.4g} (noise {:.4g}, bias {:.4g}, unsure by {:.4g}) misses "

@@ -11,6 +11,8 @@ namespace {
 constexpr int kFewestBlocks = 32;
 // Share of the squared error that blocks may leave in doubt before larger ones are taken.
 constexpr double kDoubtShare = 0.1;
+// Noise of the truths, as relMSE, that what errors are divided by may hold.
+constexpr double kQuietTruth = 0.03;
 
 double sumOf(const Vec3d& v) {
   return v.x + v.y + v.z;
@@ -56,9 +58,6 @@ std::vector<Rgb> softened(const std::vector<Rgb>& values, int width) {
     }
   return out;
 }
-
-// Noise of the truths, as relMSE, that what errors are divided by may hold.
-constexpr double kQuietTruth = 0.03;
 
 // Index of the block of the given level that holds pixel i.
 std::size_t blockOf(std::size_t i, int width, int columns, std::size_t level) {
@@ -195,10 +194,11 @@ FrameError::Scale FrameError::blockScale(const Scale& pixels, std::size_t level)
   return out;
 }
 
-double FrameError::truthNoise(const Scale& scale, std::size_t level) const {
+// relMSE of the noise of means.
+double FrameError::noiseOf(const Pyramid& noisy, const Scale& scale, std::size_t level) {
   std::vector<Vec3d> variances(scale.values.size());
-  for (std::size_t b = 0; b < variances.size(); ++b)
-    variances[b] = m_truths.varianceOfMean(level, b);
+  for (std::size_t i = 0; i < variances.size(); ++i)
+    variances[i] = noisy.varianceOfMean(level, i);
   return scale.mean(variances);
 }
 
@@ -209,7 +209,7 @@ FrameError::Scale FrameError::scaleOf(const Pyramid& frames) const {
   for (std::size_t level = 0; level < frames.levels.size(); ++level) {
     scale = scaleBy(frames, level);
     if (m_truths.count < 2) break;
-    if (truthNoise(blockScale(scale, level), level) <= kQuietTruth) break;
+    if (noiseOf(m_truths, blockScale(scale, level), level) <= kQuietTruth) break;
   }
   return scale;
 }
@@ -287,10 +287,7 @@ ErrorEstimate FrameError::estimate() const {
     e.bias = std::sqrt(widening(pixels, pixels, 0));
     return e;
   }
-  std::vector<Vec3d> variances(pixels.values.size());
-  for (std::size_t i = 0; i < variances.size(); ++i)
-    variances[i] = frames.varianceOfMean(0, i);
-  e.noise = std::sqrt(pixels.mean(variances));
+  e.noise = std::sqrt(noiseOf(frames, pixels, 0));
   for (std::size_t level = 0; level < frames.levels.size(); ++level) {
     const Scale blocks = blockScale(pixels, level);
     double bias = 0, doubt = 0;

@@ -53,7 +53,6 @@ class FrameError {
   struct Moments {
     int width = 0;
     std::vector<Rgb> mean, squares;
-    int height() const { return width > 0 ? static_cast<int>(mean.size()) / width : 0; }
   };
   // The same for the frame, for blocks of 2 x 2 pixels, of 4 x 4, and so on.
   struct Pyramid {
@@ -69,7 +68,7 @@ class FrameError {
   Scale scaleBy(const Pyramid& frames, std::size_t level) const;
   Scale scaleOf(const Pyramid& frames) const;
   Scale blockScale(const Scale& pixels, std::size_t level) const;
-  double truthNoise(const Scale& scale, std::size_t level) const;
+  static double noiseOf(const Pyramid& noisy, const Scale& scale, std::size_t level);
   double widening(const Scale& pixels, const Scale& blocks, std::size_t level) const;
   void judge(const Pyramid& frames, const Scale& blocks, std::size_t level, double& bias,
              double& standardError) const;
