@@ -179,6 +179,28 @@ void addFlicker(const StudyResult& result, std::vector<std::string>& out) {
         "moves it does what the table shows.");
 }
 
+// Which basis a light cache should hold, by g.
+void addBases(const StudyResult& result, std::vector<std::string>& out) {
+  std::string parts;
+  for (const SweepResult& sweep : result.bases) {
+    const PointResult *best = nullptr, *view = nullptr;
+    const auto error = [](const PointResult& p) {
+      return relativeError(p.errors[kMultiple][kAllPixels]);
+    };
+    for (const PointResult& p : sweep.points) {
+      if (p.family == "view") view = &p;
+      if (isCacheable(p) && (!best || error(p) < error(*best))) best = &p;
+    }
+    if (!best || !view) continue;
+    parts += fmt::format("{}{}: {} ({}; view {})", parts.empty() ? "" : "; ", sweep.name,
+                         familyTitle(best->family), percent(error(*best)), percent(error(*view)));
+  }
+  if (!parts.empty())
+    out.push_back(
+        "Of the bases that a light cache can hold, the least error at equal photons has " + parts +
+        ".");
+}
+
 }  // namespace
 
 Verdict verdictOf(const SweepResult& sweep, std::size_t layer) {
@@ -210,32 +232,9 @@ double pathSecondsFor(const std::vector<Curve>& curves, double error) {
   return 0;
 }
 
-namespace {
-
-// Which basis a light cache should hold, by g.
-void addBases(const StudyResult& result, std::vector<std::string>& out) {
-  std::string parts;
-  for (const SweepResult& sweep : result.bases) {
-    const PointResult *best = nullptr, *view = nullptr;
-    const auto error = [](const PointResult& p) {
-      return relativeError(p.errors[kMultiple][kAllPixels]);
-    };
-    for (const PointResult& p : sweep.points) {
-      if (p.family == "view") view = &p;
-      if (p.family == "view" || p.lightMemoryBytes == 0) continue;
-      if (!best || error(p) < error(*best)) best = &p;
-    }
-    if (!best || !view) continue;
-    parts += fmt::format("{}{}: {} ({}; view {})", parts.empty() ? "" : "; ", sweep.name,
-                         familyTitle(best->family), percent(error(*best)), percent(error(*view)));
-  }
-  if (!parts.empty())
-    out.push_back(
-        "Of the bases that a light cache can hold, the least error at equal photons has " + parts +
-        ".");
+bool isCacheable(const PointResult& point) {
+  return point.lightMemoryBytes > 0 && point.family != "view";
 }
-
-}  // namespace
 
 std::vector<std::string> advice(const StudyResult& result) {
   std::vector<std::string> out;

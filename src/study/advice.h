@@ -12,6 +12,9 @@ namespace photosphere::study {
 /// Sentences for people, each true of the figures at hand. Plain text: escape it for a page.
 std::vector<std::string> advice(const StudyResult& result);
 
+/// Whether a light cache can hold what the contender stores.
+bool isCacheable(const PointResult& point);
+
 /// How the photosphere fares in one sweep against what is not a photosphere.
 struct Verdict {
   double seconds = 0;       ///< at which both are compared

@@ -7,6 +7,7 @@
 
 #include "advice.h"
 #include "photosphere/core/resources.h"
+#include "tables.h"
 
 namespace photosphere::study {
 
@@ -20,8 +21,8 @@ std::string spread(const Spread& s) {
   return fmt::format("{:.3g} ({:.3g} to {:.3g})", s.median, s.min, s.max);
 }
 
-std::string mebibytes(const Spread& s) {
-  return fmt::format("{:.1f}", s.median / 1048576);
+std::string mebibytes(double bytes) {
+  return fmt::format("{:.1f}", bytes / 1048576);
 }
 
 std::string interval(const Estimate& e) {
@@ -31,11 +32,6 @@ std::string interval(const Estimate& e) {
 
 std::string optionalNumber(const std::optional<double>& value) {
   return value ? fmt::format("{:.3g}", *value) : std::string("\u2013");
-}
-
-// Whether a light cache can hold it.
-bool cacheable(const PointResult& p) {
-  return p.lightMemoryBytes > 0 && p.family != "view";
 }
 
 }  // namespace
@@ -51,11 +47,12 @@ Table pointTable(const SweepResult& sweep) {
                         "march [s]", "total [s]", "CPU [s]", "peak memory [MiB]", "photons stored",
                         "seeds"});
   for (const PointResult& p : sweep.points)
-    table.rows.push_back(
-        {p.label, seconds(p.seconds.read.median), seconds(p.seconds.rasterize.median),
-         seconds(p.seconds.trace.median), seconds(p.seconds.resolve.median),
-         seconds(p.seconds.march.median), spread(p.seconds.total), spread(p.cpuSeconds),
-         mebibytes(p.peakMemoryBytes), std::to_string(p.photonsStored), std::to_string(p.seeds)});
+    table.rows.push_back({p.label, seconds(p.seconds.read.median),
+                          seconds(p.seconds.rasterize.median), seconds(p.seconds.trace.median),
+                          seconds(p.seconds.resolve.median), seconds(p.seconds.march.median),
+                          spread(p.seconds.total), spread(p.cpuSeconds),
+                          mebibytes(p.peakMemoryBytes.median), std::to_string(p.photonsStored),
+                          std::to_string(p.seeds)});
   return table;
 }
 
@@ -162,8 +159,8 @@ Table basisTable(const StudyResult& result) {
   Table table;
   table.caption =
       "Bases of directions, layer multiple, all pixels. The last two columns are squared error "
-      "times "
-      "cost, so less is better; the best of those that a light cache can hold (all but view) is "
+      "times cost, so less is better; the best of those that a light cache can hold (all but view) "
+      "is "
       "marked *";
   table.firstNumber = 2;
   table.rows.push_back({"scene", "basis", "stored light [MiB]", "CPU [s]", "relative error",
@@ -176,9 +173,9 @@ Table basisTable(const StudyResult& result) {
     };
     const auto marked = [&](const PointResult& p, bool bytes) {
       const bool best =
-          cacheable(p) &&
+          isCacheable(p) &&
           std::all_of(sweep.points.begin(), sweep.points.end(), [&](const PointResult& other) {
-            return !cacheable(other) || cost(p, bytes) <= cost(other, bytes);
+            return !isCacheable(other) || cost(p, bytes) <= cost(other, bytes);
           });
       return fmt::format("{:.3g}{}", cost(p, bytes), best ? " *" : "");
     };
@@ -187,8 +184,7 @@ Table basisTable(const StudyResult& result) {
       const bool light = p.lightMemoryBytes > 0;
       table.rows.push_back(
           {sweep.name, p.label,
-           light ? fmt::format("{:.1f}", static_cast<double>(p.lightMemoryBytes) / 1048576)
-                 : std::string("\u2013"),
+           light ? mebibytes(static_cast<double>(p.lightMemoryBytes)) : std::string("\u2013"),
            seconds(p.cpuSeconds.median), fmt::format("{:.3g}", relativeError(f)),
            fmt::format("{:.3g}", f.biasSquared.value), fmt::format("{:.3f}", f.meanRatio.value),
            marked(p, false), light ? marked(p, true) : std::string("\u2013")});
@@ -201,8 +197,7 @@ Table estimateTable(const StudyResult& result) {
   Table table;
   table.caption =
       "Relative error of layer total over all pixels, as frames that were asked for one estimate "
-      "it "
-      "of themselves (median and range over the seeds) and as the reference tells it";
+      "it of themselves (median and range over the seeds) and as the reference tells it";
   table.firstNumber = 1;
   table.rows.push_back({"scene", "asked for", "estimated", "measured", "estimated over measured",
                         "time [s]", "path tracing alone [s]"});
@@ -240,10 +235,9 @@ Table leftOutTable(const StudyResult& result) {
   Table table;
   table.firstNumber = 9;
   table.rows.push_back({"sweep", "left out", "why"});
-  for (const auto* sweeps : {&result.sweeps, &result.bases})
-    for (const SweepResult& sweep : *sweeps)
-      for (const LeftOut& item : sweep.leftOut)
-        table.rows.push_back({sweep.name, item.name, item.why});
+  for (const SweepResult* sweep : allSweeps(result))
+    for (const LeftOut& item : sweep->leftOut)
+      table.rows.push_back({sweep->name, item.name, item.why});
   for (const LeftOut& item : result.leftOut)
     table.rows.push_back({"", item.name, item.why});
   return table;
@@ -256,15 +250,14 @@ Table referenceTable(const StudyResult& result) {
   table.rows.push_back({"sweep", "samples a pixel", "of them found", "seconds spent",
                         "noise, total", "noise, multiple", "by path traced frames",
                         "a tenth of the best or less", "key"});
-  for (const auto* sweeps : {&result.sweeps, &result.bases})
-    for (const SweepResult& sweep : *sweeps) {
-      const ReferenceNote& r = sweep.reference;
-      table.rows.push_back(
-          {sweep.name, std::to_string(r.samples), std::to_string(r.samplesBefore),
-           fmt::format("{:.1f}", r.seconds), fmt::format("{:.2g}", r.noise[kTotal]),
-           fmt::format("{:.2g}", r.noise[kMultiple]), fmt::format("{:.2g}", r.pathNoise[kMultiple]),
-           r.targetReached ? "yes" : "no", r.key});
-    }
+  for (const SweepResult* sweep : allSweeps(result)) {
+    const ReferenceNote& r = sweep->reference;
+    table.rows.push_back({sweep->name, std::to_string(r.samples), std::to_string(r.samplesBefore),
+                          fmt::format("{:.1f}", r.seconds), fmt::format("{:.2g}", r.noise[kTotal]),
+                          fmt::format("{:.2g}", r.noise[kMultiple]),
+                          fmt::format("{:.2g}", r.pathNoise[kMultiple]),
+                          r.targetReached ? "yes" : "no", r.key});
+  }
   return table;
 }
 

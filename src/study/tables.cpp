@@ -142,12 +142,19 @@ std::string csvField(const std::string& text) {
   return quoted + '"';
 }
 
-std::string csvText(const StudyResult& result) {
-  std::string text = kHeader;
+std::vector<const SweepResult*> allSweeps(const StudyResult& result) {
+  std::vector<const SweepResult*> all;
   for (const auto* sweeps : {&result.sweeps, &result.bases})
     for (const SweepResult& sweep : *sweeps)
-      for (const PointResult& point : sweep.points)
-        addRows(text, sweep, point);
+      all.push_back(&sweep);
+  return all;
+}
+
+std::string csvText(const StudyResult& result) {
+  std::string text = kHeader;
+  for (const SweepResult* sweep : allSweeps(result))
+    for (const PointResult& point : sweep->points)
+      addRows(text, *sweep, point);
   return text;
 }
 
