@@ -46,12 +46,17 @@ inline Departure departure(const Vec3d& from, const Vec3d& normal, const Boundin
 /// Points along one side of a surface, for the mean of its points' power.
 inline constexpr int kSurfaceNodes = 48;
 
-/// A flat lamp that shines to one side.
-class FlatLight : public Light {
+/// A point of a lamp's surface.
+struct SurfacePoint {
+  Vec3d position{0.0};  ///< local space [m]
+  Vec3d normal{0.0};    ///< unit, to the side that shines
+};
+
+/// A lamp of even radiance.
+class SurfaceLight : public Light {
  public:
-  /// @param axis      unit, the side it shines to; @param radiance  [W m^-2 sr^-1]
-  FlatLight(const Vec3d& center, const Vec3d& axis, const Rgb& radiance)
-      : m_center(center), m_axis(axis), m_radiance(radiance) {}
+  /// @param radiance  [W m^-2 sr^-1]
+  explicit SurfaceLight(const Rgb& radiance) : m_radiance(radiance) {}
 
   Rgb power(const BoundingSphere& bounds) const override {
     double sum = 0;
@@ -59,40 +64,61 @@ class FlatLight : public Light {
       for (int j = 0; j < kSurfaceNodes; ++j) {
         const Vec2f u((static_cast<float>(i) + 0.5f) / kSurfaceNodes,
                       (static_cast<float>(j) + 0.5f) / kSurfaceNodes);
-        sum += projectedSolidAngle(m_axis, coneToward(m_center + offset(u), bounds));
+        const SurfacePoint p = surface(u, bounds);
+        sum += projectedSolidAngle(p.normal, coneToward(p.position, bounds));
       }
     return m_radiance * static_cast<float>(sum * area() / (kSurfaceNodes * kSurfaceNodes));
   }
 
   Emission emit(const BoundingSphere& bounds, const Vec4f& u) const override {
-    const Vec3d from = m_center + offset({u.x, u.y});
-    const Departure d = departure(from, m_axis, bounds, u.z, u.w);
-    return {photonOrigin(from, d.direction, bounds), Vec3f(d.direction),
+    const SurfacePoint p = surface({u.x, u.y}, bounds);
+    const Departure d = departure(p.position, p.normal, bounds, u.z, u.w);
+    return {photonOrigin(p.position, d.direction, bounds), Vec3f(d.direction),
             m_radiance * static_cast<float>(d.weight * area())};
-  }
-
-  Illumination illuminate(const Vec3f& point, const Vec2f& u) const override {
-    Vec3d direction;
-    Illumination result = PointSource(m_center + offset(u), m_radiance * static_cast<float>(area()))
-                              .illuminate(point, direction);
-    result.irradiance *= static_cast<float>(std::max(0.0, glm::dot(direction, m_axis)));
-    return result;
   }
 
   bool isDelta() const override { return false; }
   bool isGrey() const override { return isGreyColor(m_radiance); }
 
  protected:
-  /// From the centre to a point of even density over the surface [m]. @param u  in [0, 1)^2
-  virtual Vec3d offset(const Vec2f& u) const = 0;
+  const Rgb& radiance() const { return m_radiance; }
+  /// Of even density over the surface. @param u  in [0, 1)^2
+  /// @param bounds  of the smoke, toward which a round surface may lay out its points
+  virtual SurfacePoint surface(const Vec2f& u, const BoundingSphere& bounds) const = 0;
   virtual double area() const = 0;  ///< [m^2]
 
  private:
-  Vec3d m_center, m_axis;
   Rgb m_radiance;
 };
 
-/// Rows of a flat lamp.
+/// A flat lamp that shines to one side.
+class FlatLight : public SurfaceLight {
+ public:
+  /// @param axis  unit, the side it shines to
+  FlatLight(const Vec3d& center, const Vec3d& axis, const Rgb& radiance)
+      : SurfaceLight(radiance), m_center(center), m_axis(axis) {}
+
+  Illumination illuminate(const Vec3f& point, const Vec2f& u) const override {
+    Vec3d direction;
+    Illumination result = PointSource(m_center + offset(u), radiance() * static_cast<float>(area()))
+                              .illuminate(point, direction);
+    result.irradiance *= static_cast<float>(std::max(0.0, glm::dot(direction, m_axis)));
+    return result;
+  }
+
+ protected:
+  /// From the centre to a point of even density over the surface [m]. @param u  in [0, 1)^2
+  virtual Vec3d offset(const Vec2f& u) const = 0;
+
+ private:
+  SurfacePoint surface(const Vec2f& u, const BoundingSphere&) const override {
+    return {m_center + offset(u), m_axis};
+  }
+
+  Vec3d m_center, m_axis;
+};
+
+/// What `intensity` is of a lamp with a surface.
 constexpr Param radianceRow() {
   return intensityRow("W m^-2 sr^-1", "radiance where the color is 1");
 }
