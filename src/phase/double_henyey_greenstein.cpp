@@ -1,24 +1,14 @@
 // Two lobes, such as a forward and a backward one.
 
-#include "photosphere/phase/phase.h"
+#include "rows.h"
 
 namespace photosphere::phase::plugins {
 
 namespace {
 
 constexpr Param params[] = {
-    {.name = "g1",
-     .unit = "",
-     .defaultText = "0.8",
-     .help = "mean cosine of the first lobe; the ends are excluded",
-     .min = -1.0,
-     .max = 1.0},
-    {.name = "g2",
-     .unit = "",
-     .defaultText = "-0.3",
-     .help = "mean cosine of the second lobe; the ends are excluded",
-     .min = -1.0,
-     .max = 1.0},
+    cosineRow("g1", "0.8", "mean cosine of the first lobe; the ends are excluded"),
+    cosineRow("g2", "-0.3", "mean cosine of the second lobe; the ends are excluded"),
     {.name = "mix",
      .unit = "",
      .defaultText = "0.2",

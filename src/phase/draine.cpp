@@ -1,18 +1,13 @@
 // Dust: Henyey-Greenstein's function times 1 + alpha cos^2 (Draine 2003).
 
-#include "photosphere/phase/phase.h"
+#include "rows.h"
 
 namespace photosphere::phase::plugins {
 
 namespace {
 
 constexpr Param params[] = {
-    {.name = "g",
-     .unit = "",
-     .defaultText = "0.0",
-     .help = "of Henyey-Greenstein's factor; the ends are excluded",
-     .min = -1.0,
-     .max = 1.0},
+    cosineRow("g", "0.0", "of Henyey-Greenstein's factor; the ends are excluded"),
     {.name = "a",
      .unit = "",
      .defaultText = "1.0",

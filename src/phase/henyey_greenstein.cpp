@@ -1,19 +1,15 @@
 // One lobe, forward or backward, of a given mean cosine.
 
-#include "photosphere/phase/phase.h"
+#include "rows.h"
 
 namespace photosphere::phase::plugins {
 
 namespace {
 
 constexpr Param params[] = {
-    {.name = "g",
-     .unit = "",
-     .defaultText = "0.0",
-     .help = "mean cosine of the scattering angle: 0 even, toward 1 forward, toward -1 backward; "
-             "the ends are excluded",
-     .min = -1.0,
-     .max = 1.0},
+    cosineRow("g", "0.0",
+              "mean cosine of the scattering angle: 0 even, toward 1 forward, toward -1 backward; "
+              "the ends are excluded"),
 };
 
 PhaseFunction create(const ParamValues& values) {
