@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "photosphere/cameras/camera.h"
+#include "photosphere/cameras/moving_camera.h"
 #include "photosphere/lights/light.h"
 #include "photosphere/render/integrator.h"
 
@@ -34,6 +35,8 @@ struct FrameOptions {
   RandomKey key;
   lights::LocalSpace space;  ///< camera rays are in world space
   Lens lens;                 ///< of a perspective camera
+  bool moving = false;       ///< samples have times over the shutter; else all are of its middle
+  const cameras::MovingCamera* motion = nullptr;  ///< the camera over the shutter, where it moves
 };
 
 /// Layers of a frame over its crop, row by row from the top, RGB interleaved as Rgb.

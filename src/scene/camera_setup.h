@@ -1,0 +1,31 @@
+#pragma once
+// The camera of a frame, and what it does while its shutter is open.
+
+#include <string>
+
+#include "photosphere/scene/frame_setup.h"
+
+namespace photosphere::scene {
+
+/// Blur that a pixel filter hides: a tenth of its width [pixels].
+inline constexpr double kUnseenBlur = 0.3;
+
+/// Degrees across the frame, as the camera's own options say.
+double horizontalFov(const ParamValues& camera);
+
+/// Fills `camera`, `view` and, where keys or a file move the camera, `motion`.
+/// @param scene  at the frame; the smoke of `setup` stands
+/// @throws ConfigError
+void buildCamera(const SceneFile& scene, FrameSetup& setup);
+
+/// Whether motion is simulated over the shutter.
+struct MotionBlur {
+  bool on = false;
+  std::string why;
+};
+
+/// Decides by the longest way of smoke over the picture; where it is off, `motion` goes, else
+/// `view` is that of the middle of the shutter.
+MotionBlur decideMotionBlur(const SceneFile& scene, FrameSetup& setup);
+
+}  // namespace photosphere::scene
