@@ -88,6 +88,9 @@ class Dumper {
     for (const Param& row : values.rows()) {
       if (!row.served || (name == "volume" && row.name == "albedo" && extras.starts_with("albedo")))
         continue;
+      // A frame's values of what a camera's file says.
+      if (name == "camera" && m_scene.shot.contains(row.name == "fov" ? kShotFov : row.name))
+        continue;
       std::string value = written(row, values, keys);
       const bool path = isPath(name, row.name) && !values.text(row.name).empty();
       const bool frames = name == "scene" && row.name == "frames";
