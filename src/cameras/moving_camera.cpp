@@ -34,13 +34,19 @@ double errorBetween(const Camera& from, const Camera& middle, const Camera& to,
   const double distance = glm::length(centerOf(smoke, middle) - middle.position());
   const double reach = radiusOf(smoke);
   double worst = 0;
-  for (int i = 0; i < 9; ++i) {
-    const Vec2d raster = size * Vec2d(i % 3, i / 3) * 0.5;
-    const CameraRay exact = middle.ray(raster), beside = middle.ray(raster + Vec2d(1, 0));
+  // Up to the borders, and not symmetric: a turn leaves what lies in its own plane exact.
+  constexpr double places[] = {0.0, 0.3, 0.65, 1.0};
+  for (int i = 0; i < 16; ++i) {
+    const Vec2d raster = size * Vec2d(places[i % 4], places[i / 4]);
+    const CameraRay exact = middle.ray(raster);
+    // Both neighbours: at the pole of a panorama one of them is the pixel itself.
+    const CameraRay beside = middle.ray(raster + Vec2d(1, 0));
+    const CameraRay below = middle.ray(raster + Vec2d(0, 1));
     const CameraRay even = rayBetween(from, to, raster, 0.5);
     for (const double s : {std::max(distance - reach, 0.05 * reach), distance + reach}) {
       const Vec3d p = exact.origin + exact.direction * s;
-      const double pixel = glm::length(beside.origin + beside.direction * s - p);
+      const double pixel = std::max(glm::length(beside.origin + beside.direction * s - p),
+                                    glm::length(below.origin + below.direction * s - p));
       worst = std::max(worst, glm::length(even.origin + even.direction * s - p) / pixel);
     }
   }

@@ -51,7 +51,7 @@ double worstError(const MovingCamera& moving, const MovingCamera::At& at, double
     const Vec2d raster(kPixels * rng.uniformDouble(), kPixels / 2 * rng.uniformDouble());
     const auto exact = at(open + u * (close - open));
     const CameraRay a = exact->ray(raster), b = moving.ray(raster, u);
-    const CameraRay beside = exact->ray(raster + Vec2d(1, 0));
+    const CameraRay beside = exact->ray(raster + Vec2d(0, 1));
     const Vec3d p = a.origin + a.direction * distance;
     const double pixel = glm::length(beside.origin + beside.direction * distance - p);
     worst = std::max(worst, glm::length(b.origin + b.direction * distance - p) / pixel);
