@@ -154,14 +154,14 @@ class FrameLoop {
       Rng rng(m_options.key, RandomStream::camera,
               static_cast<std::uint64_t>(firstSample + s) << 40 | pixel);
       const Vec2d raster = Vec2d(x + 0.5, y + 0.5) + m_offsets[static_cast<std::size_t>(s)];
-      const double time = shutterTime(firstSample + s, pixel);
+      const float u = m_options.moving ? shutterTime(firstSample + s, pixel) : 0.5f;
       const cameras::MovingCamera* motion = m_options.motion;
-      const cameras::Placement place = motion ? motion->placement(time) : m_still;
-      cameras::CameraRay ray = motion ? motion->ray(raster, time) : m_camera.ray(raster);
+      const cameras::Placement place = motion ? motion->placement(u) : m_still;
+      cameras::CameraRay ray = motion ? motion->ray(raster, u) : m_camera.ray(raster);
       if (m_options.lens.radius > 0.0)
         ray = throughLens(ray, place, lensPoint(firstSample + s, pixel));
       RayRadiance r = m_integrator.radiance(m_options.space.localFromWorld(ray.origin),
-                                            Vec3f(ray.direction), rng, counters);
+                                            Vec3f(ray.direction), moment(u), rng, counters);
       if (!m_camera.isPanorama())
         r.depth *= static_cast<float>(glm::dot(ray.direction, place.axis));
       const bool nan = isNan(r);
@@ -184,15 +184,18 @@ class FrameLoop {
     return sampleDisc(Vec2f(glm::min(u, Vec2d(1.0 - 0x1p-24))));
   }
 
-  // When in the shutter's opening a sample is taken: 0 = it opens, 1 = it closes. Samples of a
-  // pixel follow the golden ratio's sequence, which no power of R2's number meets, from a random
-  // shift of each pixel. In the middle, and without a random number, where nothing moves.
-  double shutterTime(int sample, std::uint64_t pixel) const {
-    if (!m_options.moving) return 0.5;
-    // No sample has this number, nor has the lens.
+  // Part of the shutter's time that has passed, in [0, 1): samples of a pixel follow the golden
+  // ratio's sequence from a random start of each pixel.
+  float shutterTime(int sample, std::uint64_t pixel) const {
+    // No sample has this number.
     Rng rng(m_options.key, RandomStream::camera, std::uint64_t{0xfffffe} << 40 | pixel);
-    const double u = rng.uniformDouble() + 0.6180339887498949 * static_cast<double>(sample);
-    return u - std::floor(u);
+    const double u = rng.uniformDouble() + 0.6180339887498949 * sample;
+    return static_cast<float>(std::min(u - std::floor(u), 1.0 - 0x1p-24));
+  }
+  transport::Moment moment(float u) const {
+    const transport::Shutter& shutter = m_options.shutter;
+    return {
+        static_cast<float>(shutter.open + static_cast<double>(u) * (shutter.close - shutter.open))};
   }
 
   // The ray from a point of the lens to where the ray through its middle meets the plane in focus.

@@ -74,10 +74,6 @@ double horizontalFov(const ParamValues& camera) {
 void buildCamera(const SceneFile& scene, FrameSetup& setup) {
   setup.camera = cameraOf(scene, scene.camera, setup.worldBounds);
   setView(cameras::placementOf(*setup.camera), setup);
-  const Vec2d shutter = scene.camera.vec2("shutter");
-  if (shutter.y < shutter.x)
-    throw ConfigError(fmt::format("{}: 'shutter' closes at {}, before it opens at {}",
-                                  scene.cameraWhere, shutter.y, shutter.x));
   if (scene.framesSmoke()) {
     if (!setup.worldBounds.empty())
       setup.notes.push_back(
@@ -85,6 +81,7 @@ void buildCamera(const SceneFile& scene, FrameSetup& setup) {
           "place it to hold it still over a sequence");
     return;
   }
+  const Vec2d shutter = scene.camera.vec2("shutter");
   const std::vector<double> keys = motionKeys(scene);
   if (keys.empty() || shutter.y == shutter.x || scene.effects.text("motion_blur") == "off") return;
   const auto frame = static_cast<double>(setup.frame);
@@ -93,17 +90,8 @@ void buildCamera(const SceneFile& scene, FrameSetup& setup) {
       frame + shutter.x, frame + shutter.y, keys, setup.worldBounds);
 }
 
-MotionBlur decideMotionBlur(const SceneFile& scene, FrameSetup& setup) {
-  const std::string& wish = scene.effects.text("motion_blur");
-  if (wish == "off") return {false, "off in the scene"};
-  if (!setup.motion) return {false, "the camera stands still, and no volume has a velocity"};
-  const double blur = setup.motion->blur(setup.worldBounds);
-  const bool on = wish == "on" || blur > kUnseenBlur;
-  if (on)
-    setView(setup.motion->placement(0.5), setup);
-  else
-    setup.motion.reset();
-  return {on, fmt::format("the camera moves the smoke over up to {:.2g} pixels", blur)};
+void viewFromTheMiddle(FrameSetup& setup) {
+  if (setup.motion) setView(setup.motion->placement(0.5), setup);
 }
 
 Mat4d frameBox(const Box3d& box, const Vec3d& target, const Vec3d& up, double fovDegrees,

@@ -1,8 +1,6 @@
 #pragma once
 // The camera of a frame, and what it does while its shutter is open.
 
-#include <string>
-
 #include "photosphere/scene/frame_setup.h"
 
 namespace photosphere::scene {
@@ -18,14 +16,7 @@ double horizontalFov(const ParamValues& camera);
 /// @throws ConfigError
 void buildCamera(const SceneFile& scene, FrameSetup& setup);
 
-/// Whether motion is simulated over the shutter.
-struct MotionBlur {
-  bool on = false;
-  std::string why;
-};
-
-/// Decides by the longest way of smoke over the picture; where it is off, `motion` goes, else
-/// `view` is that of the middle of the shutter.
-MotionBlur decideMotionBlur(const SceneFile& scene, FrameSetup& setup);
+/// Makes `view` that of the middle of the shutter, where the camera moves.
+void viewFromTheMiddle(FrameSetup& setup);
 
 }  // namespace photosphere::scene

@@ -13,6 +13,8 @@
 #include "photosphere/core/resources.h"
 #include "photosphere/phase/phase.h"
 #include "photosphere/volume/rasterize.h"
+#include "photosphere/volume/vdb_file.h"
+#include "photosphere/volume/velocity.h"
 #include "smoke_source.h"
 #include "volume_emission.h"
 
@@ -23,6 +25,8 @@ namespace {
 // Independent parts of a frame whose error is estimated: the relative standard error of a variance
 // from eight is about a half, but the mean of it over pixels is far better.
 constexpr int kErrorBatches = 8;
+// Voxels that a velocity is carried on beyond those that the cache has.
+constexpr double kMostMargin = 48;
 
 Mat4d localFromWorld(const lights::LocalSpace& space) {
   Mat4d m(space.metersPerUnit);
@@ -44,6 +48,40 @@ std::uint64_t memoryBudget(const SceneFile& scene) {
   return static_cast<std::uint64_t>(std::max(1.0, std::min(bytes, 9e18)));
 }
 
+// Largest of [r, g, b].
+double largestScale(const VolumeEntry& entry) {
+  return maxComponent(entry.values.vec3("density_scale"));
+}
+
+// The densest channel's, and what the others have of it.
+void setExtinction(const VolumeEntry& entry, transport::MediumVolume& placed) {
+  placed.densityScale = largestScale(entry);
+  if (placed.densityScale > 0)
+    placed.tint = Rgb(entry.values.vec3("density_scale") / placed.densityScale);
+}
+
+// Velocity in local space, wide enough for all that moves while the shutter is open.
+transport::VolumeMotion placeMotion(const VolumeSource& source, const lights::LocalSpace& space,
+                                    const transport::Shutter& shutter, std::uint64_t budget) {
+  transport::VolumeMotion motion;
+  if (!source.velocity || !(shutter.longest() > 0)) return motion;
+  const Mat3d linear(localFromWorld(space) * source.worldFromFile);
+  const Mat4d localFromIndex = localFromWorld(space) * source.worldFromIndex(source.velocity);
+  const double raw = volume::statistics(source.velocity).max;
+  const double longest =
+      std::max({glm::length(linear[0]), glm::length(linear[1]), glm::length(linear[2])});
+  const double voxels = raw * longest * shutter.longest() / volume::finestSpacing(localFromIndex);
+  const int margin = static_cast<int>(std::min(std::ceil(voxels) + 1, kMostMargin));
+  const volume::Grid grid =
+      volume::velocityForLookups(source.velocity, linear, margin, source.path);
+  motion.velocity = volume::vectorBricksFromGrid(grid, source.path, budget);
+  motion.localFromNode = localFromIndex * nodeShift(motion.velocity.origin());
+  volume::forEachNode(motion.velocity, [&](const Vec4f& v) {
+    motion.fastest = std::max(motion.fastest, glm::length(Vec3d(v)));
+  });
+  return motion;
+}
+
 transport::MediumVolume placeVolume(const VolumeEntry& entry, const VolumeSource& source,
                                     const lights::LocalSpace& space, std::uint64_t budget) {
   transport::MediumVolume placed;
@@ -52,7 +90,7 @@ transport::MediumVolume placeVolume(const VolumeEntry& entry, const VolumeSource
   placed.density = volume::bricksFromGrid(source.density, 0, source.path, false, budget);
   placed.localFromNode = localFromWorld(space) * source.worldFromIndex(source.density) *
                          nodeShift(placed.density.origin());
-  placed.densityScale = entry.values.vec3("density_scale").x;
+  setExtinction(entry, placed);
   placed.albedo = entry.values.rgb("albedo");
   if (source.albedo) {
     const int components = source.albedo.kind() == volume::GridKind::vector ? 3 : 1;
@@ -81,7 +119,12 @@ SceneFile sceneOfFrame(const SceneFile& written, std::int64_t frame, const Setup
                      std::vector<double>{static_cast<double>(options.resolution->x),
                                          static_cast<double>(options.resolution->y)},
                      scene.cameraWhere);
-  return sceneAt(scene, static_cast<double>(frame));
+  scene = sceneAt(scene, static_cast<double>(frame));
+  const Vec2d shutter = scene.camera.vec2("shutter");
+  if (shutter.y < shutter.x)
+    throw ConfigError(fmt::format("{}: 'shutter' closes at {}, before it opens at {}",
+                                  scene.cameraWhere, shutter.y, shutter.x));
+  return scene;
 }
 
 // Two passes: where the smoke is, then the smoke about its own centre.
@@ -89,8 +132,9 @@ void buildMedium(const SceneFile& scene, std::int64_t cacheFrame, bool wantParti
                  FrameSetup& setup) {
   std::vector<VolumeSource> sources;
   const bool glows = scene.effects.text("emission") != "off";
+  const bool moves = scene.effects.text("motion_blur") != "off";
   for (const VolumeEntry& entry : scene.volumes) {
-    sources.push_back(readVolume(scene, entry, cacheFrame, wantParticles, glows));
+    sources.push_back(readVolume(scene, entry, cacheFrame, {wantParticles, glows, moves}));
     setup.readSeconds += sources.back().readSeconds;
     setup.rasterizeSeconds += sources.back().rasterizeSeconds;
     setup.worldBounds.grow(sources.back().bounds());
@@ -101,12 +145,13 @@ void buildMedium(const SceneFile& scene, std::int64_t cacheFrame, bool wantParti
   if (!setup.worldBounds.empty()) setup.space.center = setup.worldBounds.center();
 
   const Stopwatch watch;
+  const Vec2d frames = scene.camera.vec2("shutter") / scene.scene.real("fps");
+  const transport::Shutter shutter{frames.x, frames.y};
   std::vector<transport::MediumVolume> placed;
   for (std::size_t i = 0; i < sources.size(); ++i) {
     for (const Vec3d& p : sources[i].particles)
       setup.particles.emplace_back(setup.space.localFromWorld(p));
-    const double scale = scene.volumes[i].values.vec3("density_scale").x;
-    if (!visible(sources[i], scale)) {
+    if (!visible(sources[i], largestScale(scene.volumes[i]))) {
       setup.notes.push_back(fmt::format("{}: no smoke in it at this frame", sources[i].path));
       continue;
     }
@@ -115,9 +160,10 @@ void buildMedium(const SceneFile& scene, std::int64_t cacheFrame, bool wantParti
       placed.back().emission =
           placeEmission(scene.volumes[i], sources[i], localFromWorld(setup.space),
                         scene.output.text("colorspace"), setup.memoryBudget, setup.notes);
+    placed.back().motion = placeMotion(sources[i], setup.space, shutter, setup.memoryBudget);
     if (placed.back().density.empty() && placed.back().emission.field.empty()) placed.pop_back();
   }
-  setup.medium = std::make_unique<transport::Medium>(std::move(placed));
+  setup.medium = std::make_unique<transport::Medium>(std::move(placed), shutter);
   // Active voxels may hold zeros: what frames the smoke is the box of what scatters or emits.
   setup.worldBounds = Box3d();
   if (const Box3d& local = setup.medium->bounds(); !local.empty()) {
@@ -168,8 +214,7 @@ class EffectPlan {
         lamps ? "lights reach smoke that scatters" : "smoke scatters the light that it gives off");
     e.shadows = unlessOff("shadows", dark, "smoke casts shadows on itself");
     chromatic();
-    const MotionBlur blur = decideMotionBlur(m_scene, m_setup);
-    e.motionBlur = note("motion_blur", blur.on, blur.why);
+    motionBlur();
     depthOfField();
     bool surroundings = false;
     for (const LightEntry& light : m_scene.lights)
@@ -187,6 +232,51 @@ class EffectPlan {
   bool unlessOff(const std::string& name, const std::string& never, const std::string& why) {
     if (m_scene.effects.text(name) == "off") return note(name, false, "off in the scene");
     return never.empty() ? note(name, true, why) : note(name, false, never);
+  }
+  // Off where nothing moves farther than a pixel filter sees.
+  void motionBlur() {
+    bool& on = m_setup.effects.motionBlur;
+    on = false;
+    const std::string& wish = m_scene.effects.text("motion_blur");
+    if (wish == "off") {
+      note("motion_blur", false, "off in the scene");
+    } else if (!m_setup.medium->isMoving() && !m_setup.motion) {
+      note("motion_blur", false, "no volume has a velocity, and the camera stands still");
+    } else {
+      const double smoke = m_setup.medium->isMoving() ? smokeBlur() : 0.0;
+      const double camera = m_setup.motion ? m_setup.motion->blur(m_setup.worldBounds) : 0.0;
+      on = wish == "on" || smoke + camera > kUnseenBlur;
+      note("motion_blur", on,
+           fmt::format("the {} by up to {:.2g} pixels while the shutter is open",
+                       !m_setup.motion               ? "smoke moves"
+                       : !m_setup.medium->isMoving() ? "camera moves the smoke"
+                                                     : "smoke and the camera move it",
+                       smoke + camera));
+      if (on) return;
+      if (m_setup.medium->isMoving()) *m_setup.medium = std::move(*m_setup.medium).held();
+      m_setup.motion.reset();
+    }
+  }
+  // Farthest way of the fastest smoke, seen from as near as any smoke is [pixels].
+  double smokeBlur() const {
+    const transport::Medium& medium = *m_setup.medium;
+    const transport::Shutter& shutter = medium.shutter();
+    const double way = medium.displacement() / shutter.longest() * (shutter.close - shutter.open) /
+                       m_setup.space.metersPerUnit;
+    return way * pixelsPerUnit();
+  }
+  // Of the nearest smoke, in any direction [pixels per scene unit].
+  double pixelsPerUnit() const {
+    const cameras::Camera& camera = *m_setup.camera;
+    const double width = camera.resolution().x;
+    const Box3d& box = m_setup.worldBounds;
+    if (!camera.hasEye())
+      return 1 / glm::length(camera.ray({1, 0}).origin - camera.ray({0, 0}).origin);
+    const Vec3d nearest = glm::clamp(camera.position(), box.min, box.max);
+    const double distance = std::max(glm::length(nearest - camera.position()), 1e-9);
+    return camera.isPanorama()
+               ? width / (2 * kPi * distance)
+               : width / (2 * std::tan(horizontalFov(m_scene.camera) * kPi / 360) * distance);
   }
   // Off where the widest blur in the smoke is less than a pixel filter sees.
   void depthOfField() {
@@ -244,7 +334,9 @@ class EffectPlan {
   }
 
   void chromatic() {
-    std::string coloured = m_setup.medium->isGrey() ? "" : "an albedo is coloured";
+    std::string coloured = m_setup.medium->isColoured() ? "extinction is coloured"
+                           : m_setup.medium->isGrey()   ? ""
+                                                        : "an albedo is coloured";
     const transport::Emission* emission = m_setup.medium->emission();
     if (emission && !emission->isGrey()) coloured = "the emission is coloured";
     for (const auto& light : m_setup.lights)
@@ -258,7 +350,8 @@ class EffectPlan {
     m_setup.effects.chromatic =
         wish == "on" ? note("chromatic", true, "on in the scene")
                      : note("chromatic", !coloured.empty(),
-                            coloured.empty() ? "lights, albedos and emission are grey" : coloured);
+                            coloured.empty() ? "lights, extinction, albedos and emission are grey"
+                                             : coloured);
   }
 
   const SceneFile& m_scene;
@@ -354,6 +447,7 @@ FrameSetup setUpFrame(const SceneFile& written, std::int64_t frame, const SetupO
   buildLights(scene, setup);
   buildCamera(scene, setup);
   EffectPlan(scene, setup).decide();
+  viewFromTheMiddle(setup);
   buildLayout(scene, options, setup);
   const std::int64_t seed = options.seed.value_or(scene.scene.integer("seed"));
   setup.key = RandomKey::fromSeed(static_cast<std::uint64_t>(seed),

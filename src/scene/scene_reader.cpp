@@ -19,10 +19,6 @@ namespace photosphere::scene {
 
 namespace {
 
-[[noreturn]] void notServed(const std::string& place, std::string_view what) {
-  throw ConfigError(fmt::format("{}: {} is not served by this version yet", place, what));
-}
-
 std::string textOf(const toml::node& node, std::string_view key, const std::string& place) {
   const auto* text = node.as_string();
   if (!text) throw ConfigError(fmt::format("{}: '{}' must be text", place, key));
@@ -71,16 +67,6 @@ ParamValue frameRate(ParamValue value, const std::string& place) {
     return numerator / denominator;
   throw ConfigError(fmt::format(
       "{}: 'fps' = '{}' is neither a number nor a ratio such as \"24000/1001\"", place, *text));
-}
-
-// One extinction for all channels, at every key.
-void checkGrey(const VolumeEntry& entry, const std::string& place) {
-  Track scales{{0, numbersOf(entry.values, {.name = "density_scale", .type = ParamType::rgb})}};
-  if (const auto keys = entry.keys.find("density_scale"); keys != entry.keys.end())
-    scales = keys->second;
-  for (const Key& key : scales)
-    if (key.value[0] != key.value[1] || key.value[1] != key.value[2])
-      notServed(place, "'density_scale' with unequal channels (coloured extinction)");
 }
 
 bool hasRow(const ParamValues& values, std::string_view key) {
@@ -342,7 +328,6 @@ void SceneReader::readVolume(const toml::table& from, std::size_t index) {
     } else {
       readAnimated(path, k, node, entry.values, entry.keys);
     }
-    if (k == "density_scale") checkGrey(entry, place);
   }
   if (entry.values.text("file").empty())
     throw ConfigError(

@@ -19,7 +19,7 @@ constexpr double kDistance = 10;
 class Ball final : public render::Integrator {
  public:
   explicit Ball(const Vec3d& at) : m_at(at) {}
-  render::RayRadiance radiance(const Vec3d& origin, const Vec3f& direction, Rng&,
+  render::RayRadiance radiance(const Vec3d& origin, const Vec3f& direction, transport::Moment, Rng&,
                                render::IntegratorCounters&) const override {
     const Vec3d d = glm::normalize(Vec3d(direction)), to = m_at - origin;
     render::RayRadiance r;

@@ -142,11 +142,6 @@ TEST(Keys, ComplaintsNameFileLineAndKey) {
   has("matrix = [{ frame = 1, value = [1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1] },\n"
       "{ frame = 2, value = [1,0,0,0, 0,1,0,0, 0,0,-1,0, 0,0,0,1] }]\n",
       "some keys mirror");
-  EXPECT_TRUE(contains(complaint([] {
-                         sceneOf(kLit, {"volume.0.density_scale=[{ frame = 1, value = 1 }, { frame "
-                                        "= 2, value = [1, 2, 3] }]"});
-                       }),
-                       "unequal channels"));
   EXPECT_TRUE(contains(complaint([] { sceneOf(kLit, {"render.step=[{ frame = 1, value = 1 }]"}); }),
                        "cannot have"));
   EXPECT_TRUE(

@@ -181,9 +181,7 @@ TEST_P(NotServedTest, IsRefusedAndSaysSo) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Contract, NotServedTest,
-                         ::testing::Values("volume.0.velocity=v",
-                                           "volume.0.density_scale=[1, 2, 3]",
-                                           "output.deep=deep.exr", "output.light_groups=true"));
+                         ::testing::Values("output.deep=deep.exr", "output.light_groups=true"));
 
 TEST(SceneFileTest, NamesThatNobodyKnowsAreNotCalledPromised) {
   for (const char* set : {"light.0.type=lamp", "volume.0.phase={ type = \"mie\" }",

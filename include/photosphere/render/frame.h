@@ -35,7 +35,8 @@ struct FrameOptions {
   RandomKey key;
   lights::LocalSpace space;  ///< camera rays are in world space
   Lens lens;                 ///< of a perspective camera
-  bool moving = false;       ///< samples have times over the shutter; else all are of its middle
+  bool moving = false;       ///< something moves while the shutter is open
+  transport::Shutter shutter;
   const cameras::MovingCamera* motion = nullptr;  ///< the camera over the shutter, where it moves
 };
 
