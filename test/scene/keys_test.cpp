@@ -336,5 +336,17 @@ TEST_F(ShotTest, FramesAreThoseOfTheirTime) {
   EXPECT_EQ(moving.ndcFromWorld, plain.ndcFromWorld) << "matrices are those at the frame";
 }
 
+// Light is kept with the lamps of its frame.
+TEST_F(ShotTest, ALightCacheIsOfItsFrame) {
+  std::vector<std::string> sets = {
+      "light.0.intensity=[{ frame = 1, value = 50 }, { frame = 5, value = 200 }]",
+      "estimator.photons=2000", "camera.resolution=[8, 8]"};
+  const std::string path = (m_folder / "light.vdb").string();
+  traceScene(scene(sets), 3, path);
+  sets.push_back("estimator.cache=" + path);
+  EXPECT_EQ(complaint([&] { renderScene(scene(sets), 3); }), "");
+  EXPECT_NE(complaint([&] { renderScene(scene(sets), 4); }, ExitCode::inputInvalid), "");
+}
+
 }  // namespace
 }  // namespace photosphere::test
