@@ -147,6 +147,8 @@ TEST(Keys, ComplaintsNameFileLineAndKey) {
   EXPECT_TRUE(
       contains(complaint([] { sceneOf(kLit, {"light.0.size=[{ frame = 1, value = [1, 1] }]"}); }),
                "'size' is an option of light type rect"));
+  EXPECT_TRUE(contains(complaint([] { sceneOf(kLit, {"camera.up=[{frame=1,value=[1]}]"}); }),
+                       "--set camera.up=[{frame=1,value=[1]}]: [camera]: 'up' must be"));
   EXPECT_TRUE(contains(
       complaint([] { sceneOf(kLit, {"camera.fov=[{frame=2,value=3},{frame=1,value=3}]"}); }),
       "[camera]: the keys of 'fov'"));
