@@ -46,8 +46,9 @@ constexpr Param softRadiusRow() {
           .type = ParamType::real,
           .unit = "scene units",
           .defaultText = "0.0",
-          .help = "of the ball that it shines from, with the same intensity, for soft shadows; "
-                  "dark inside; 0 = a point",
+          .help =
+              "of the ball that it shines from, with the same intensity, for soft shadows; "
+              "dark inside; 0 = a point",
           .min = 0.0,
           .max = 1e9};
 }
@@ -86,9 +87,7 @@ class PointSource {
   /// @param position   local space [m]
   /// @param intensity  [W/sr]
   PointSource(const Vec3d& position, const Rgb& intensity)
-      : m_position(position),
-        m_intensity(intensity),
-        m_largestInverse(1 / roundingAt(position)) {}
+      : m_position(position), m_intensity(intensity), m_largestInverse(1 / roundingAt(position)) {}
 
   const Vec3d& position() const { return m_position; }
   const Rgb& intensity() const { return m_intensity; }
