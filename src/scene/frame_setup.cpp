@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "effect_plan.h"
@@ -44,6 +45,25 @@ std::uint64_t memoryBudget(const SceneFile& scene) {
   return static_cast<std::uint64_t>(std::max(1.0, std::min(bytes, 9e18)));
 }
 
+bool sameNodes(const volume::BrickField<float>& a, const volume::BrickField<float>& b) {
+  if (a.origin() != b.origin() || a.bricks() != b.bricks() || a.empty() != b.empty()) return false;
+  const Vec3i& bricks = a.bricks();
+  for (int z = 0; z < bricks.z && !a.empty(); ++z)
+    for (int y = 0; y < bricks.y; ++y)
+      for (int x = 0; x < bricks.x; ++x) {
+        const std::int32_t i = a.brickAt({x, y, z}), j = b.brickAt({x, y, z});
+        if ((i < 0) != (j < 0)) return false;
+        if (i >= 0 && !std::equal(a.nodes(i), a.nodes(i) + a.kBrickSize, b.nodes(j))) return false;
+      }
+  return true;
+}
+
+// One field says what three equal ones do: the albedo is grey.
+void dropEqualChannels(std::vector<volume::BrickField<float>>& fields) {
+  if (fields.size() == 3 && sameNodes(fields[0], fields[1]) && sameNodes(fields[0], fields[2]))
+    fields.resize(1);
+}
+
 transport::MediumVolume placeVolume(const VolumeEntry& entry, const VolumeSource& source,
                                     const lights::LocalSpace& space, std::uint64_t budget) {
   transport::MediumVolume placed;
@@ -59,6 +79,7 @@ transport::MediumVolume placeVolume(const VolumeEntry& entry, const VolumeSource
     for (int c = 0; c < components; ++c)
       placed.albedoFields.push_back(
           volume::bricksFromGrid(source.albedo, c, source.path, false, budget));
+    dropEqualChannels(placed.albedoFields);
     placed.localFromAlbedoNode = localFromWorld(space) * source.worldFromIndex(source.albedo) *
                                  nodeShift(placed.albedoFields.front().origin());
   }

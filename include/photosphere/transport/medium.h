@@ -93,7 +93,7 @@ class Medium {
   double voxelEdge() const { return m_voxelEdge; }
   /// True when every albedo has equal channels.
   bool isGrey() const { return m_grey; }
-  /// Largest albedo of any channel anywhere.
+  /// Largest albedo of any channel where there is smoke.
   float maximumAlbedo() const { return m_maximumAlbedo; }
   const std::vector<MediumVolume>& volumes() const { return m_volumes; }
   /// Hash of everything that light transport depends on, as 16 hex digits.
