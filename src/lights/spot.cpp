@@ -87,6 +87,9 @@ double sharedSolidAngle(const Falloff& falloff, const Vec3d& axis, const Cone& c
   return sum;
 }
 
+// More than rounding takes from an angle [rad].
+constexpr double kAngleSlack = 1e-6;
+
 class SpotLight final : public Light {
  public:
   SpotLight(const Vec3d& position, const Vec3d& axis, const Rgb& intensity, const Falloff& falloff)
@@ -95,6 +98,22 @@ class SpotLight final : public Light {
   Rgb power(const BoundingSphere& bounds) const override {
     return m_source.intensity() * static_cast<float>(sharedSolidAngle(
                                       m_falloff, m_axis, coneToward(m_source.position(), bounds)));
+  }
+
+  /// Full on the part of the spot's cone that lies nearest to its axis, dark where that misses.
+  Reach reach(const BoundingSphere& bounds) const override {
+    Reach reach =
+        reachFrom(m_source.position(), 0.0, maxComponent(Vec3d(m_source.intensity())), bounds);
+    const double between = angleFromOneMinusCos(oneMinusCosBetween(m_axis, reach.axis));
+    const double nearest = reach.oneMinusCos >= 2.0
+                               ? 0.0
+                               : between - angleFromOneMinusCos(reach.oneMinusCos) - kAngleSlack;
+    reach.fluence *= m_falloff(oneMinusCos(std::max(0.0, nearest)));
+    if (m_falloff.outer() < reach.oneMinusCos) {
+      reach.axis = m_axis;
+      reach.oneMinusCos = m_falloff.outer();
+    }
+    return reach;
   }
 
   /// Draws from the smaller of the spot's cone and the sphere's; what falls outside the other has

@@ -2,81 +2,293 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
+#include "light_bounds.h"
 #include "photosphere/core/error.h"
+#include "photosphere/phase/phase.h"
+#include "pre_render.h"
 
 namespace photosphere::scene {
 
 namespace {
 
-// Pixels; a tenth of the pixel filter's width.
-constexpr double kUnseenBlur = 0.3;
+// What bounds cannot say of pictures that are looked at here and there: differences between
+// neighbours may be this many times as large as the largest that was met.
+constexpr double kSafety = 2.0;
+
+// The directions in which light flies that the camera sees, a filter's reach beyond the frame.
+DirectionCone seenDirections(const SceneFile& scene, const FrameSetup& setup) {
+  constexpr double border = 8, rounding = 1e-5;
+  DirectionCone cone;
+  cone.axis = -setup.camera->viewDirection();
+  if (setup.camera->isPanorama()) return cone;
+  cone.angle = rounding;
+  const Vec2d size(setup.camera->resolution());
+  const double beyond = border + scene.render.real("filter_width");
+  for (const Vec2d& corner : {Vec2d(-beyond), Vec2d(size.x + beyond, -beyond),
+                              Vec2d(-beyond, size.y + beyond), size + beyond}) {
+    const Vec3d seen = -setup.camera->ray(corner).direction;
+    cone.angle = std::max(cone.angle, std::acos(std::min(1.0, glm::dot(seen, cone.axis))));
+  }
+  cone.angle += std::atan2(setup.lens.radius, setup.lens.focusDistance) + rounding;
+  return cone;
+}
+
+// What is said about one effect.
+struct Decision {
+  bool on = false;
+  std::string why;
+  std::optional<double> bound = std::nullopt;
+};
 
 class EffectPlan {
  public:
-  EffectPlan(const SceneFile& scene, FrameSetup& setup) : m_scene(scene), m_setup(setup) {}
+  EffectPlan(const SceneFile& scene, bool forOtherViews, FrameSetup& setup)
+      : m_scene(scene),
+        m_setup(setup),
+        m_tolerance(scene.effects.real("tolerance")),
+        m_forOtherViews(forOtherViews),
+        m_single(scene.estimator.text("type") == "single") {}
 
   void decide() {
     Effects& e = m_setup.effects;
-    const transport::Medium& medium = *m_setup.medium;
-    const bool glows = medium.emission() != nullptr;
-    const bool lamps = !m_setup.lights.empty();
-    const std::string inert = !(medium.majorants().maximum() > 0) ? "there is no smoke"
-                              : medium.maximumAlbedo() <= 0 ? "the smoke only absorbs (albedo 0)"
-                                                            : "";
-    const std::string dark = !inert.empty() ? inert : lamps ? "" : "there is no light";
-    const bool single = m_scene.estimator.text("type") == "single";
-    e.emission = unlessOff("emission", glows ? "" : "no volume emits", "a volume emits");
-    e.singleScattering = unlessOff("single_scattering", dark, "lights reach smoke that scatters");
-    e.multipleScattering = unlessOff(
-        "multiple_scattering",
-        single                   ? "estimator.type is single"
-        : glows && inert.empty() ? ""
-                                 : dark,
-        lamps ? "lights reach smoke that scatters" : "smoke scatters the light that it gives off");
-    e.shadows = unlessOff("shadows", dark, "smoke casts shadows on itself");
+    const bool smoke = !m_setup.medium->bounds().empty();
+    m_scatters = m_setup.medium->majorants().maximum() > 0 && m_setup.medium->maximumAlbedo() > 0;
+    Decision lens = prepareLens();
+    if (smoke) m_bounds.emplace(*m_setup.medium, seenDirections(m_scene, m_setup));
+    for (const auto& light : m_setup.lights)
+      m_lamps.push_back(m_bounds ? m_bounds->lamp(*light) : LampBound{});
+    e.environment = environment();
+    Decision lamps = dropDarkLamps();
+    e.emission = glows() && !isOff("emission");
+    e.singleScattering = !m_setup.lights.empty() && m_scatters && !isOff("single_scattering");
+
+    // In the order of what leaving them out saves.
+    Decision multiple = multipleScattering();
+    dropFaintLamps(lamps);
+    Decision emission = this->emission();
+    Decision single = singleScattering();
+    e.emission = emission.on;
+    e.singleScattering = single.on;
+    e.multipleScattering = multiple.on;
+    Decision shadows = this->shadows();
+    e.shadows = shadows.on;
+    depthOfField(lens);
+
+    note("emission", emission);
+    note("single_scattering", single);
+    note("multiple_scattering", multiple);
+    note("shadows", shadows);
     chromatic();
-    e.motionBlur = note("motion_blur", false, "no volume has a velocity");
-    depthOfField();
-    bool surroundings = false;
-    for (const LightEntry& light : m_scene.lights)
-      surroundings = surroundings || light.type == "environment";
-    e.environment = unlessOff("environment", surroundings ? "" : "there is no environment light",
-                              "an environment shines");
+    motionBlur();
+    note("depth_of_field", lens);
+    note("environment", m_environment);
+    note("lights", lamps);
+    directions();
   }
 
  private:
-  bool note(const std::string& name, bool on, const std::string& why) {
-    m_setup.effectStates.push_back({name, on, why});
-    return on;
+  bool is(std::string_view name, std::string_view wish) const {
+    return m_scene.effects.text(name) == wish;
   }
+  bool isOff(std::string_view name) const { return is(name, "off"); }
+  bool isOn(std::string_view name) const { return is(name, "on"); }
+  bool glows() const { return m_setup.medium->emission() != nullptr; }
+  void note(const std::string& name, const Decision& decision) {
+    m_setup.effectStates.push_back({name, decision.on, decision.why, decision.bound});
+  }
+
+  // On or off as the scene says, else off where it adds exactly nothing.
   // @param never  why it cannot contribute; empty when it can
-  bool unlessOff(const std::string& name, const std::string& never, const std::string& why) {
-    if (m_scene.effects.text(name) == "off") return note(name, false, "off in the scene");
-    return never.empty() ? note(name, true, why) : note(name, false, never);
+  Decision unlessNever(std::string_view name, const std::string& never, std::string why) const {
+    if (isOff(name)) return {false, "off in the scene"};
+    if (never.empty()) return {true, std::move(why)};
+    if (isOn(name)) return {true, fmt::format("on in the scene, although {}", never)};
+    return {false, never, 0.0};
   }
-  // Off where the widest blur in the smoke is less than a pixel filter sees.
-  void depthOfField() {
-    const ParamValues& camera = m_scene.camera;
-    const double fstop = camera.real("fstop");
-    const std::string& wish = m_scene.effects.text("depth_of_field");
-    bool& on = m_setup.effects.depthOfField;
-    on = false;
-    if (wish == "off") {
-      note("depth_of_field", false, "off in the scene");
-    } else if (!(fstop > 0)) {
-      note("depth_of_field", false, "the camera is a pinhole");
-    } else if (m_scene.cameraType != "perspective") {
-      note("depth_of_field", false, "only a perspective camera has a lens");
-    } else {
-      const render::Lens lens = lensOf(camera, fstop);
-      const double blur = widestBlur(lens);
-      on = wish == "on" || blur > kUnseenBlur;
-      note("depth_of_field", on,
-           fmt::format("the lens blurs the smoke over up to {:.2g} pixels", blur));
-      if (on) m_setup.lens = lens;
+
+  // Takes its share of the tolerance where what would be left out fits into what remains.
+  // @param most  of any pixel [W m^-2 sr^-1]
+  std::optional<double> afford(double most) {
+    if (!(m_tolerance > m_spent) || !std::isfinite(most)) return std::nullopt;
+    // No picture of these lamps is brighter: it need not be looked at to see that this is too much.
+    double brightest = m_bounds->glow();
+    for (const LampBound& lamp : m_lamps)
+      brightest += lamp.single + lamp.background;
+    if (!(most <= (m_tolerance - m_spent) * brightest)) return std::nullopt;
+    const double mean = picture().meanRadiance;
+    if (!(mean > 0) || !(most / mean <= m_tolerance - m_spent)) return std::nullopt;
+    m_spent += most / mean;
+    return most / mean;
+  }
+  static std::string share(double bound) {
+    return fmt::format("at most {:.2g} of the smoke's mean radiance", bound);
+  }
+
+  // Of everything that is not scattered twice or more, before anything else is left out.
+  const PreRender& picture() {
+    if (!m_picture) {
+      Effects effects = m_setup.effects;
+      effects.shadows = true;
+      m_picture = preRender(m_setup, effects);
     }
+    return *m_picture;
+  }
+
+  bool environment() {
+    bool surroundings = false, shines = false;
+    for (std::size_t i = 0; i < m_setup.lights.size(); ++i) {
+      const double background = m_setup.lights[i]->reach({}).background;
+      surroundings = surroundings || background > 0 || m_setup.lights[i]->isUniform();
+      shines = shines || background > 0;
+    }
+    for (const LightEntry& light : m_scene.lights)
+      surroundings = surroundings || light.type == "environment";
+    m_environment = unlessNever("environment",
+                                shines         ? ""
+                                : surroundings ? "the environment is black"
+                                               : "there is no environment light",
+                                "an environment shines");
+    return m_environment.on;
+  }
+
+  void dropLamp(std::size_t i) {
+    m_setup.lights.erase(m_setup.lights.begin() + static_cast<std::ptrdiff_t>(i));
+    m_lamps.erase(m_lamps.begin() + static_cast<std::ptrdiff_t>(i));
+  }
+
+  // Lamps that light no smoke and that no ray meets.
+  Decision dropDarkLamps() {
+    const std::size_t all = m_setup.lights.size();
+    if (!m_bounds) return {all > 0, all > 0 ? "there is no smoke" : "there is none"};
+    std::vector<std::string> dark;
+    for (std::size_t i = all; i-- > 0;)
+      if (!(m_setup.lights[i]->reach(transport::boundingSphere(*m_setup.medium)).fluence > 0) &&
+          !(m_lamps[i].background > 0)) {
+        dark.push_back(fmt::format("'{}'", m_setup.lights[i]->name()));
+        dropLamp(i);
+      }
+    m_allLamps = all;
+    if (all == 0) return {false, "there is none"};
+    if (dark.empty()) return {true, fmt::format("{} of {} shine on the smoke", all, all)};
+    std::reverse(dark.begin(), dark.end());
+    return {all > dark.size(),
+            fmt::format("{} of {} shine on the smoke; no light of {} reaches it", all - dark.size(),
+                        all, fmt::join(dark, ", ")),
+            0.0};
+  }
+
+  // Lamps beside which others are so bright that they may be left out.
+  void dropFaintLamps(Decision& lamps) {
+    if (m_forOtherViews || isOn("single_scattering") || isOn("multiple_scattering")) return;
+    std::vector<std::string> faint;
+    double sum = 0;
+    while (!m_setup.lights.empty()) {
+      std::size_t least = 0;
+      for (std::size_t i = 1; i < m_lamps.size(); ++i)
+        if (m_lamps[i].all() < m_lamps[least].all()) least = i;
+      const std::optional<double> bound = afford(m_lamps[least].all());
+      if (!bound) break;
+      sum += *bound;
+      faint.push_back(fmt::format("'{}'", m_setup.lights[least]->name()));
+      dropLamp(least);
+    }
+    if (faint.empty()) return;
+    lamps.on = !m_setup.lights.empty();
+    lamps.bound = sum;
+    lamps.why = fmt::format("{} of {} shine on the smoke; without {}, {}", m_setup.lights.size(),
+                            m_allLamps, fmt::join(faint, ", "), share(sum));
+  }
+
+  // Why no lamp's light is scattered toward the eye; empty where it is.
+  std::string dark() const {
+    if (!(m_setup.medium->majorants().maximum() > 0)) return "there is no smoke";
+    if (!m_scatters) return "the smoke only absorbs (albedo 0)";
+    if (!m_setup.lights.empty()) return "";
+    return m_allLamps > 0 ? "no light shines on the smoke" : "there is no light";
+  }
+
+  Decision singleScattering() {
+    return unlessNever("single_scattering", dark(), "lights reach smoke that scatters");
+  }
+
+  Decision multipleScattering() {
+    const bool lit = glows() && !isOff("emission") && m_scatters;
+    if (m_single && !isOff("multiple_scattering")) return {false, "estimator.type is single"};
+    Decision decision =
+        unlessNever("multiple_scattering", lit ? "" : dark(),
+                    m_setup.lights.empty() ? "smoke scatters the light that it gives off"
+                                           : "lights reach smoke that scatters");
+    if (!decision.on || isOn("multiple_scattering") || m_forOtherViews) return decision;
+    double most = lit ? m_bounds->scatteredGlow() : 0.0;
+    for (const LampBound& lamp : m_lamps)
+      most += lamp.multiple;
+    if (const std::optional<double> bound = afford(most))
+      return {false, "the smoke is thin: light scattered twice or more is " + share(*bound), bound};
+    return decision;
+  }
+
+  Decision emission() {
+    Decision decision = unlessNever("emission", glows() ? "" : darkEmission(), "a volume emits");
+    if (!decision.on || !glows() || isOn("emission") || m_forOtherViews) return decision;
+    const std::optional<double> bound =
+        afford(m_bounds->glow() + (m_scatters ? m_bounds->scatteredGlow() : 0.0));
+    if (!bound) return decision;
+    // Nothing is left that births photons or fills bricks.
+    std::vector<transport::MediumVolume> volumes = std::move(*m_setup.medium).takeVolumes();
+    for (transport::MediumVolume& volume : volumes)
+      volume.emission = {};
+    m_setup.medium = std::make_unique<transport::Medium>(std::move(volumes));
+    return {false, "the smoke's glow is " + share(*bound), bound};
+  }
+  std::string darkEmission() const {
+    for (const VolumeEntry& volume : m_scene.volumes)
+      if (volume.emits) return "the emission is zero everywhere";
+    return "no volume emits";
+  }
+
+  Decision shadows() {
+    Decision decision = unlessNever("shadows", dark(), "smoke casts shadows on itself");
+    if (!decision.on || isOn("shadows")) return decision;
+    double most = 0;
+    for (const LampBound& lamp : m_lamps)
+      most += (lamp.single + lamp.multiple) * lamp.shadow;
+    if (const std::optional<double> bound = afford(most))
+      return {false, "the smoke is thin: its shadows take away " + share(*bound), bound};
+    return decision;
+  }
+
+  void motionBlur() { note("motion_blur", {false, "no volume has a velocity", 0.0}); }
+
+  // Why there is no lens; otherwise it is on, and the frame has it.
+  Decision prepareLens() {
+    const double fstop = m_scene.camera.real("fstop");
+    if (isOff("depth_of_field")) return {false, "off in the scene"};
+    if (!(fstop > 0)) return {false, "the camera is a pinhole", 0.0};
+    if (m_scene.cameraType != "perspective")
+      return {false, "only a perspective camera has a lens", 0.0};
+    m_setup.lens = lensOf(m_scene.camera, fstop);
+    return {true, fmt::format("the lens blurs the smoke over up to {:.2g} pixels",
+                              widestBlur(m_setup.lens))};
+  }
+
+  // Off where the widest blur moves light by less than shows: a pixel is the mean of what lies
+  // within half of it, where the picture differs by no more than its steepest step a pixel times
+  // that way along either axis.
+  void depthOfField(Decision& lens) {
+    if (lens.on && m_bounds && !isOn("depth_of_field") && m_tolerance > m_spent) {
+      const double mean = picture().meanRadiance;
+      const double most =
+          kSafety * std::sqrt(2.0) * 0.5 * widestBlur(m_setup.lens) * picture().steepest;
+      if (mean > 0 && most / mean <= m_tolerance - m_spent) {
+        m_spent += most / mean;
+        lens = {false, fmt::format("{}, {}", lens.why, share(most / mean)), most / mean};
+      }
+    }
+    m_setup.effects.depthOfField = lens.on;
+    if (!lens.on) m_setup.lens = {};
   }
   // Focal length over twice the f-number; in focus by default: the middle of the smoke.
   render::Lens lensOf(const ParamValues& camera, double fstop) const {
@@ -117,20 +329,35 @@ class EffectPlan {
     if (emission && !emission->isGrey()) coloured = "the emission is coloured";
     for (const auto& light : m_setup.lights)
       if (!light->isGrey()) coloured = fmt::format("light '{}' is coloured", light->name());
-    const std::string& wish = m_scene.effects.text("chromatic");
-    if (wish == "off" && !coloured.empty())
+    if (isOff("chromatic") && !coloured.empty())
       throw ConfigError(
           fmt::format("[effects]: chromatic = \"off\", but {}; one channel cannot "
                       "hold that, so make it grey or leave chromatic at auto",
                       coloured));
-    m_setup.effects.chromatic =
-        wish == "on" ? note("chromatic", true, "on in the scene")
-                     : note("chromatic", !coloured.empty(),
-                            coloured.empty() ? "lights, albedos and emission are grey" : coloured);
+    const Decision decision = unlessNever(
+        "chromatic", coloured.empty() ? "lights, albedos and emission are grey" : "", coloured);
+    m_setup.effects.chromatic = decision.on;
+    note("chromatic", decision);
+  }
+
+  void directions() {
+    const bool even = scattersEvenly(*m_setup.medium);
+    note("directions", even ? Decision{false, "every phase function is isotropic", 0.0}
+                            : Decision{true, "a phase function depends on the direction"});
   }
 
   const SceneFile& m_scene;
   FrameSetup& m_setup;
+  double m_tolerance;
+  double m_spent = 0;    // of the tolerance
+  bool m_forOtherViews;  // the light is kept for cameras that are not known
+  bool m_single;         // light scattered twice is nobody's to estimate
+  bool m_scatters = false;
+  std::size_t m_allLamps = 0;
+  std::optional<LightBounds> m_bounds;  // nothing without smoke
+  std::vector<LampBound> m_lamps;       // as m_setup.lights
+  std::optional<PreRender> m_picture;
+  Decision m_environment;
 };
 
 }  // namespace
@@ -142,8 +369,15 @@ double horizontalFov(const ParamValues& camera) {
   return camera.real("fov");
 }
 
-void planEffects(const SceneFile& scene, FrameSetup& setup) {
-  EffectPlan(scene, setup).decide();
+bool scattersEvenly(const transport::Medium& medium) {
+  for (const phase::PhaseFunction& phase : medium.phases())
+    for (int i = 0; i < phase.lobes(); ++i)
+      if (phase.lobe(i).g() != 0.0 || phase.lobe(i).alpha() != 0.0) return false;
+  return true;
+}
+
+void planEffects(const SceneFile& scene, bool forOtherViews, FrameSetup& setup) {
+  EffectPlan(scene, forOtherViews, setup).decide();
 }
 
 }  // namespace photosphere::scene

@@ -239,6 +239,15 @@ void buildLayout(const SceneFile& scene, const SetupOptions& options, FrameSetup
                       "direction, as estimator.basis = \"view\" would be noisier",
                       g, l.bins()));
   }
+  // Bins would all be read alike: one coefficient holds what counts.
+  const bool ofBins = l.direction != sphere::DirectionDeposit::nearest ||
+                      l.representative != Representative::bin || l.merge != Merge::full ||
+                      l.angularKernel != sphere::AngularKernel::none;
+  if (e.text("basis") == "auto" && l.basis == Basis::histogram && !ofBins &&
+      scattersEvenly(*setup.medium)) {
+    l.basis = Basis::sphericalHarmonics;
+    l.order = 0;
+  }
   l.channels = setup.effects.chromatic ? 3 : 1;
   l.phases = static_cast<int>(setup.medium->phases().size());
   for (const auto& light : setup.lights)
@@ -269,7 +278,7 @@ FrameSetup setUpFrame(const SceneFile& scene, std::int64_t frame, const SetupOpt
   buildMedium(scene, options.cacheFrame.value_or(frame), particles, setup);
   buildLights(scene, setup);
   buildCamera(scene, options, setup);
-  planEffects(scene, setup);
+  planEffects(scene, options.forLightCache || !scene.estimator.text("cache").empty(), setup);
   buildLayout(scene, options, setup);
   const std::int64_t seed = options.seed.value_or(scene.scene.integer("seed"));
   setup.key = RandomKey::fromSeed(static_cast<std::uint64_t>(seed),

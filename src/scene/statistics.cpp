@@ -14,6 +14,11 @@ nlohmann::ordered_json channels(const Vec3d& v) {
   return {v.x, v.y, v.z};
 }
 
+nlohmann::ordered_json bound(const EffectState& effect) {
+  if (!effect.bound) return nullptr;
+  return *effect.bound;
+}
+
 }  // namespace
 
 std::string statsJson(const FrameStatistics& s) {
@@ -46,7 +51,8 @@ std::string statsJson(const FrameStatistics& s) {
   if (s.clampedLight > 0) json["clamped_light"] = s.clampedLight;
   json["effects"] = nlohmann::ordered_json::object();
   for (const EffectState& effect : s.effects)
-    json["effects"][effect.name] = {{"on", effect.on}, {"why", effect.why}, {"bound", nullptr}};
+    json["effects"][effect.name] = {
+        {"on", effect.on}, {"why", effect.why}, {"bound", bound(effect)}};
   json["image"] = {{"mean", s.imageMean}, {"max", s.imageMax}};
   json["version"] = versionText();
   json["scene_hash"] = s.sceneHash;

@@ -96,6 +96,8 @@ class Medium {
   /// Largest albedo of any channel where there is smoke.
   float maximumAlbedo() const { return m_maximumAlbedo; }
   const std::vector<MediumVolume>& volumes() const { return m_volumes; }
+  /// What it was made of, to make another of.
+  std::vector<MediumVolume> takeVolumes() && { return std::move(m_volumes); }
   /// Hash of everything that light transport depends on, as 16 hex digits.
   const std::string& hash() const { return m_hash; }
   std::uint64_t memoryBytes() const;
