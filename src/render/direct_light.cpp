@@ -39,8 +39,9 @@ DirectLight::DirectLight(const Medium& medium, const transport::LightList& light
     if (lights[i]->isDelta() || !carried) m_lamps.push_back(i);
 }
 
+template <class Light, class When>
 Rgb DirectLight::at(const Vec3f& p, const Vec3f& wo, const Coefficients& c, const MarchStep* step,
-                    Rng& rng, IntegratorCounters& counters) const {
+                    Rng& rng, IntegratorCounters& counters, When when) const {
   Rgb sum(0.0f);
   for (const std::size_t i : m_lamps) {
     const lights::Light& light = *m_lights[i];
@@ -49,12 +50,23 @@ Rgb DirectLight::at(const Vec3f& p, const Vec3f& wo, const Coefficients& c, cons
     if (!(maxComponent(in.irradiance) > 0.0f)) continue;
     if (step && in.distance < 8.0f * (step->t1 - step->t0))
       in.irradiance *= nearLampFactor(*step, p, in);
-    const float visible = m_useShadows ? m_shadows.transmittance(i, p, in.direction, in.distance,
-                                                                 rng, counters.tracking)
-                                       : 1.0f;
+    const Light visible = m_useShadows
+                              ? m_shadows.transmittance<Light>(i, p, in.direction, in.distance, rng,
+                                                               counters.tracking, when)
+                              : Light(1.0f);
     sum += phased(m_medium, c, in.direction, wo) * in.irradiance * visible;
   }
   return sum;
 }
+
+#define PHOTOSPHERE_DIRECT(LIGHT, WHEN)                                                        \
+  template Rgb DirectLight::at<LIGHT, WHEN>(const Vec3f&, const Vec3f&, const Coefficients&,   \
+                                            const MarchStep*, Rng&, IntegratorCounters&, WHEN) \
+      const;
+PHOTOSPHERE_DIRECT(float, transport::Still)
+PHOTOSPHERE_DIRECT(float, transport::Moment)
+PHOTOSPHERE_DIRECT(Rgb, transport::Still)
+PHOTOSPHERE_DIRECT(Rgb, transport::Moment)
+#undef PHOTOSPHERE_DIRECT
 
 }  // namespace photosphere::render

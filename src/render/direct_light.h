@@ -25,8 +25,11 @@ class DirectLight {
 
   /// Light scattered at `p` toward `wo` [W m^-3 sr^-1]. Where `p` is the middle of a march step, a
   /// near lamp's 1/d^2 is averaged over the step.
+  /// @tparam Light  of transmittances: float, or Rgb where extinction differs from channel to
+  ///                channel
+  template <class Light, class When>
   Rgb at(const Vec3f& p, const Vec3f& wo, const transport::Coefficients& c, const MarchStep* step,
-         Rng& rng, IntegratorCounters& counters) const;
+         Rng& rng, IntegratorCounters& counters, When when) const;
 
  private:
   const transport::Medium& m_medium;

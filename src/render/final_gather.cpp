@@ -3,14 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
-#include "photosphere/transport/scatter.h"
-
 namespace photosphere::render {
 
 using transport::Coefficients;
 using transport::Collision;
 
-float RayOpacity::sample(float u) const {
+RayOpacity::Place RayOpacity::sample(float u) const {
   const float target = u * total();
   const auto found =
       std::upper_bound(m_steps.begin(), m_steps.end(), target,
@@ -22,7 +20,9 @@ float RayOpacity::sample(float u) const {
   const float depth = at->extinction * at->length;
   const float inside =
       depth > 1e-3f ? -fastLog(1.0f - part * (1.0f - fastExp(-depth))) / depth : part;
-  return at->begin + at->length * std::min(inside, 1.0f);
+  const float mean = meanComponent(at->removed);
+  return {at->begin + at->length * std::min(inside, 1.0f),
+          mean > 0.0f ? at->removed / mean : Rgb(1.0f)};
 }
 
 FinalGather::FinalGather(const transport::Medium& medium, DirectLight direct,
@@ -34,38 +34,72 @@ FinalGather::FinalGather(const transport::Medium& medium, DirectLight direct,
       m_emission(effects.emission ? medium.emission() : nullptr),
       m_rays(rays) {}
 
+// What becomes of light that does meet something at a point.
+template <class When>
+transport::ScatterEvent FinalGather::scatterAt(const Vec3f& p, const Vec3f& wi, const Rgb& power,
+                                               Rng& rng, When when) const {
+  if (!m_medium.isColoured()) return transport::scatter(m_medium, p, wi, power, rng, when);
+  Coefficients c;
+  m_medium.coefficients(p, c, when);
+  return transport::scatterColoured(m_medium, c, Rgb(0.0f),
+                                    m_medium.channels(p, c.extinction, when), wi, power, rng);
+}
+
+template <class Light, class When>
 Rgb FinalGather::multiple(const transport::Segment& ray, const RayOpacity& opacity, Rng& rng,
-                          IntegratorCounters& counters) const {
+                          IntegratorCounters& counters, When when) const {
   if (!(opacity.total() > 0.0f)) return Rgb(0.0f);
   Rgb sum(0.0f);
   const float stratum = 1.0f / static_cast<float>(m_rays);
   for (int i = 0; i < m_rays; ++i) {
-    const float t = opacity.sample((static_cast<float>(i) + rng.uniform()) * stratum);
-    const Vec3f p = ray.origin + ray.direction * t;
-    const transport::ScatterEvent event = transport::scatter(m_medium, p, ray.direction, rng);
-    if (event.survived) sum += event.weight * arriving(p, event.direction, rng, counters);
+    const RayOpacity::Place place =
+        opacity.sample((static_cast<float>(i) + rng.uniform()) * stratum);
+    const Vec3f p = ray.origin + ray.direction * place.distance;
+    const transport::ScatterEvent event = scatterAt(p, ray.direction, place.removed, rng, when);
+    if (event.survived)
+      sum += arriving<Light>(p, event.direction, place.removed * event.weight, rng, counters, when);
   }
   return sum * (opacity.total() * stratum);
 }
 
-// Radiance that arrives at `p` from `d`, but for lamps and surroundings seen through the smoke:
-// what they send scatters at `p` for the first time and is `single`.
-Rgb FinalGather::arriving(const Vec3f& p, const Vec3f& d, Rng& rng,
-                          IntegratorCounters& counters) const {
-  const Collision hit =
-      transport::sampleCollision(m_medium, p, d, kInfinity, rng, counters.tracking);
-  Rgb radiance(0.0f);
-  if (m_emission)
-    radiance += transport::sampleEmission(m_medium, *m_emission, p, d, hit.distance, rng);
-  if (!hit.happened()) return radiance;
-  ++counters.scatterings;
-  const Vec3f q = p + d * hit.distance;
-  Coefficients c;
-  m_medium.coefficients(q, c);
-  if (!(c.extinction > 0.0f)) return radiance;
-  const estimators::Inscatter in = m_source.at(q, -d, c);
-  const Rgb lamps = m_direct.at(q, -d, c, nullptr, rng, counters);
-  return radiance + (lamps + in.single + in.multiple) / c.extinction;
+// Radiance that arrives at `p` from `d`, times a power: all but lamps and surroundings seen through
+// the smoke, as what they send scatters at `p` for the first time and is `single`.
+template <class Light, class When>
+Rgb FinalGather::arriving(Vec3f p, const Vec3f& d, const Rgb& power, Rng& rng,
+                          IntegratorCounters& counters, When when) const {
+  Rgb radiance(0.0f), left = power;
+  while (true) {
+    const Collision hit =
+        transport::sampleCollision(m_medium, p, d, kInfinity, rng, counters.tracking, when);
+    if (m_emission)
+      radiance +=
+          left * transport::sampleEmission(m_medium, *m_emission, p, d, hit.distance, rng, when);
+    if (!hit.happened()) return radiance;
+    ++counters.scatterings;
+    p += d * hit.distance;
+    Coefficients c;
+    m_medium.coefficients(p, c, when);
+    if (!(c.extinction > 0.0f)) return radiance;
+    const estimators::Inscatter in = m_source.at(p, -d, c);
+    const Rgb lamps = m_direct.at<Light>(p, -d, c, nullptr, rng, counters, when);
+    radiance += left * (lamps + in.single + in.multiple) / c.extinction;
+    if constexpr (std::is_same_v<Light, float>) return radiance;
+    // Each channel passes by its own chance what was a collision for the densest.
+    const Rgb passes = transport::passingChance(c, m_medium.channels(p, c.extinction, when));
+    const float sum = left.x + left.y + left.z;
+    const float pass = sum > 0.0f ? glm::dot(left, passes) / sum : 0.0f;
+    if (!(rng.uniform() < pass)) return radiance;
+    left *= passes / pass;
+  }
 }
+
+#define PHOTOSPHERE_GATHER(LIGHT, WHEN)                                                         \
+  template Rgb FinalGather::multiple<LIGHT, WHEN>(const transport::Segment&, const RayOpacity&, \
+                                                  Rng&, IntegratorCounters&, WHEN) const;
+PHOTOSPHERE_GATHER(float, transport::Still)
+PHOTOSPHERE_GATHER(float, transport::Moment)
+PHOTOSPHERE_GATHER(Rgb, transport::Still)
+PHOTOSPHERE_GATHER(Rgb, transport::Moment)
+#undef PHOTOSPHERE_GATHER
 
 }  // namespace photosphere::render

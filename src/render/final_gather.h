@@ -6,6 +6,7 @@
 #include "direct_light.h"
 #include "photosphere/estimators/inscatter.h"
 #include "photosphere/render/integrator.h"
+#include "photosphere/transport/scatter.h"
 
 namespace photosphere::render {
 
@@ -13,18 +14,25 @@ namespace photosphere::render {
 class RayOpacity {
  public:
   void clear() { m_steps.clear(); }
-  /// @param opacity  of the ray up to the end of this step
-  void add(float t0, float t1, float extinction, float opacity) {
-    m_steps.push_back({t0, t1 - t0, extinction, opacity});
+  /// @param extinction  mean of the channels'
+  /// @param opacity     of the ray up to the end of this step, mean of the channels
+  /// @param removed     light that this step takes out of each channel
+  void add(float t0, float t1, float extinction, float opacity, const Rgb& removed) {
+    m_steps.push_back({t0, t1 - t0, extinction, opacity, removed});
   }
   /// Opacity of the whole ray.
   float total() const { return m_steps.empty() ? 0.0f : m_steps.back().opacity; }
-  /// Distance drawn in proportion to transmittance times extinction. @param u  in [0, 1)
-  float sample(float u) const;
+  struct Place {
+    float distance;  ///< [m]
+    Rgb removed;     ///< there, in ratio to the mean of the channels: 1 where they are alike
+  };
+  /// Drawn in proportion to transmittance times extinction. @param u  in [0, 1)
+  Place sample(float u) const;
 
  private:
   struct Step {
     float begin, length, extinction, opacity;
+    Rgb removed;
   };
   std::vector<Step> m_steps;
 };
@@ -40,11 +48,18 @@ class FinalGather {
   /// Light scattered twice or more, and the smoke's own scattered at least once, along a camera
   /// ray [W m^-2 sr^-1]: at first collisions drawn from its opacity, one direction each is followed
   /// to the next collision, where lamps are seen directly and everything else is looked up.
+  /// @tparam Light  float, or Rgb where extinction differs from channel to channel
+  template <class Light, class When>
   Rgb multiple(const transport::Segment& ray, const RayOpacity& opacity, Rng& rng,
-               IntegratorCounters& counters) const;
+               IntegratorCounters& counters, When when) const;
 
  private:
-  Rgb arriving(const Vec3f& p, const Vec3f& d, Rng& rng, IntegratorCounters& counters) const;
+  template <class When>
+  transport::ScatterEvent scatterAt(const Vec3f& p, const Vec3f& wi, const Rgb& power, Rng& rng,
+                                    When when) const;
+  template <class Light, class When>
+  Rgb arriving(Vec3f p, const Vec3f& d, const Rgb& power, Rng& rng, IntegratorCounters& counters,
+               When when) const;
 
   const transport::Medium& m_medium;
   DirectLight m_direct;

@@ -156,8 +156,9 @@ class FrameLoop {
       const Vec2d raster = Vec2d(x + 0.5, y + 0.5) + m_offsets[static_cast<std::size_t>(s)];
       cameras::CameraRay ray = m_camera.ray(raster);
       if (m_options.lens.radius > 0.0) ray = throughLens(ray, lensPoint(firstSample + s, pixel));
+      const float u = m_options.moving ? shutterTime(firstSample + s, pixel) : 0.5f;
       RayRadiance r = m_integrator.radiance(m_options.space.localFromWorld(ray.origin),
-                                            Vec3f(ray.direction), rng, counters);
+                                            Vec3f(ray.direction), moment(u), rng, counters);
       if (!m_camera.isPanorama()) r.depth *= static_cast<float>(glm::dot(ray.direction, m_axis));
       const bool nan = isNan(r);
       if (nan || isNegative(r)) {
@@ -177,6 +178,20 @@ class FrameLoop {
               Vec2d(0.7548776662466927, 0.5698402909980532) * static_cast<double>(sample);
     u -= glm::floor(u);
     return sampleDisc(Vec2f(glm::min(u, Vec2d(1.0 - 0x1p-24))));
+  }
+
+  // Part of the shutter's time that has passed, in [0, 1): samples of a pixel follow the golden
+  // ratio's sequence from a random start of each pixel.
+  float shutterTime(int sample, std::uint64_t pixel) const {
+    // No sample has this number.
+    Rng rng(m_options.key, RandomStream::camera, std::uint64_t{0xfffffe} << 40 | pixel);
+    const double u = rng.uniformDouble() + 0.6180339887498949 * sample;
+    return static_cast<float>(std::min(u - std::floor(u), 1.0 - 0x1p-24));
+  }
+  transport::Moment moment(float u) const {
+    const transport::Shutter& shutter = m_options.shutter;
+    return {
+        static_cast<float>(shutter.open + static_cast<double>(u) * (shutter.close - shutter.open))};
   }
 
   // The ray from a point of the lens to where the ray through its middle meets the plane in focus.

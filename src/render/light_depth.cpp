@@ -132,8 +132,9 @@ std::uint64_t LightDepth::predictedBytes() const {
 }
 
 // Marches the 9 x 9 rays of one column of bricks, [first, end) of m_active, away from the lamp.
-// There is nothing to add between its bricks.
-void LightDepth::marchColumn(const Medium& medium, float step, std::size_t first, std::size_t end,
+// There is nothing to add between its bricks. along(o, d) gives the extinction by distance.
+template <class Along>
+void LightDepth::marchColumn(const Along& along, float step, std::size_t first, std::size_t end,
                              float* nodes) const {
   const Vec3i column = m_active[first] * kEdge;
   const float h = 1.0f / m_nodesPerLength;
@@ -145,7 +146,7 @@ void LightDepth::marchColumn(const Medium& medium, float step, std::size_t first
       const Vec3f inPlane = m_right * ray.x + m_up * ray.y;
       // The place at a depth z behind the centre is linear in z.
       const Vec3f perDepth = m_axis + inPlane * m_inverseDistance;
-      const Medium::AlongRay extinction(medium, m_center + inPlane, perDepth);
+      const auto extinction = along(m_center + inPlane, perDepth);
       const float length = h * std::sqrt(glm::dot(perDepth, perDepth));
       const int parts = std::max(1, static_cast<int>(std::ceil(length / step * 0.9999f)));
       const float part = h / static_cast<float>(parts);
@@ -167,7 +168,30 @@ void LightDepth::marchColumn(const Medium& medium, float step, std::size_t first
     }
 }
 
-void LightDepth::fill(const Medium& medium, float step) {
+void LightDepth::fill(const Medium& medium, float step, int channel,
+                      const std::optional<transport::Moment>& when) {
+  const auto whole = [&](auto time) {
+    fillFrom([&, time](const Vec3f& o, const Vec3f& d) { return medium.alongRay(o, d, time); },
+             step);
+  };
+  const auto single = [&](auto time) {
+    fillFrom(
+        [&, time](const Vec3f& o, const Vec3f& d) {
+          return [&medium, time, channel, o, d](float t) {
+            const Vec3f p = o + d * t;
+            return medium.channels(p, medium.extinction(p, time), time)[channel];
+          };
+        },
+        step);
+  };
+  if (channel < 0)
+    when ? whole(*when) : whole(transport::Still{});
+  else
+    when ? single(*when) : single(transport::Still{});
+}
+
+template <class Along>
+void LightDepth::fillFrom(const Along& along, float step) {
   std::vector<std::size_t> columns;
   for (std::size_t i = 0; i < m_active.size(); ++i)
     if (i == 0 || m_active[i].x != m_active[i - 1].x || m_active[i].y != m_active[i - 1].y)
@@ -177,7 +201,7 @@ void LightDepth::fill(const Medium& medium, float step) {
   std::vector<float> nodes(m_active.size() * kBrickSize);
   parallelFor(count, 4, [&](std::size_t begin, std::size_t end) {
     for (std::size_t c = begin; c < end; ++c)
-      marchColumn(medium, step, columns[c], columns[c + 1], nodes.data() + columns[c] * kBrickSize);
+      marchColumn(along, step, columns[c], columns[c + 1], nodes.data() + columns[c] * kBrickSize);
   });
   // Bricks by number, for the field that asks by place.
   const Vec3i* firstBrick = m_active.data();

@@ -23,8 +23,11 @@ class LightDepth {
                                         const lights::Light& light);
   /// Memory that `fill` needs while it works.
   std::uint64_t predictedBytes() const;
-  /// @param step  largest march step [m]
-  void fill(const transport::Medium& medium, float step);
+  /// @param step     largest march step [m]
+  /// @param channel  whose extinction is summed; -1 = Medium::extinction
+  /// @param when     nothing = the frame's own time
+  void fill(const transport::Medium& medium, float step, int channel = -1,
+            const std::optional<transport::Moment>& when = std::nullopt);
 
   /// Optical depth between the lamp and a place in the smoke. Local space.
   float at(const Vec3f& p) const {
@@ -43,8 +46,11 @@ class LightDepth {
   Vec3d nodePosition(const Vec3d& p) const;
   void chooseLattice(const Box3d& box);
   void findBricks(const volume::MajorantGrid& majorants);
-  void marchColumn(const transport::Medium& medium, float step, std::size_t first, std::size_t end,
+  template <class Along>
+  void marchColumn(const Along& along, float step, std::size_t first, std::size_t end,
                    float* nodes) const;
+  template <class Along>
+  void fillFrom(const Along& along, float step);
 
   Vec3f m_center{0.0f};                           // of the smoke, local space [m]
   Vec3f m_right{0.0f}, m_up{0.0f}, m_axis{0.0f};  // unit; the axis points away from the lamp

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <optional>
+#include <type_traits>
 
 #include "final_gather.h"
 
@@ -19,6 +20,30 @@ constexpr float kOpaque = 1e-5f;
 constexpr float kStepDepth = 0.5f;
 constexpr float kFinest = 1.0f / 16.0f;
 
+float exponential(float x) {
+  return fastExp(x);
+}
+Rgb exponential(const Rgb& x) {
+  return {fastExp(x.x), fastExp(x.y), fastExp(x.z)};
+}
+// (1 - exp(-x)) / x, its series where the difference would cancel.
+float averaged(float depth, float attenuated) {
+  return depth > 1e-3f ? (1.0f - attenuated) / depth : 1.0f - 0.5f * depth;
+}
+Rgb averaged(const Rgb& depth, const Rgb& attenuated) {
+  return {averaged(depth.x, attenuated.x), averaged(depth.y, attenuated.y),
+          averaged(depth.z, attenuated.z)};
+}
+float meanOf(float value) {
+  return value;
+}
+float meanOf(const Rgb& value) {
+  return meanComponent(value);
+}
+
+// Light is what transmittances are made of: float, or Rgb where extinction differs from channel to
+// channel. When is Still, or Moment where the smoke moves.
+template <class Light, class When>
 class MarchIntegrator final : public Integrator {
  public:
   MarchIntegrator(const Medium& medium, const transport::LightList& lights, const Shadows& shadows,
@@ -40,19 +65,21 @@ class MarchIntegrator final : public Integrator {
                        *source, options.effects, options.gatherRays);
   }
 
-  RayRadiance radiance(const Vec3d& origin, const Vec3f& direction, Rng& rng,
-                       IntegratorCounters& counters) const override {
+  RayRadiance radiance(const Vec3d& origin, const Vec3f& direction, transport::Moment moment,
+                       Rng& rng, IntegratorCounters& counters) const override {
+    When when;
+    if constexpr (std::is_same_v<When, transport::Moment>) when = moment;
     RayRadiance result;
     const Segment ray = transport::clipToMedium(m_medium, origin, direction,
                                                 std::numeric_limits<double>::infinity());
-    float transmittance = 1.0f;
+    Light transmittance(1.0f);
     if (ray.length > 0.0f && m_gather) {
       static thread_local RayOpacity opacity;
       opacity.clear();
-      transmittance = march(ray, &opacity, result, rng, counters);
-      result.multiple = m_gather->multiple(ray, opacity, rng, counters);
+      transmittance = march(ray, when, &opacity, result, rng, counters);
+      result.multiple = m_gather->multiple<Light>(ray, opacity, rng, counters, when);
     } else if (ray.length > 0.0f) {
-      transmittance = march(ray, nullptr, result, rng, counters);
+      transmittance = march(ray, when, nullptr, result, rng, counters);
     }
     result.transmittance = Rgb(transmittance);
     for (const auto& light : m_lights)
@@ -63,10 +90,10 @@ class MarchIntegrator final : public Integrator {
  private:
   // Steps lie on one lattice along the ray, offset at random, so that neighbouring rays do not
   // band; cells without extinction and emission are skipped.
-  float march(const Segment& ray, RayOpacity* opacity, RayRadiance& result, Rng& rng,
+  Light march(const Segment& ray, When when, RayOpacity* opacity, RayRadiance& result, Rng& rng,
               IntegratorCounters& counters) const {
-    float transmittance = 1.0f;
-    const Medium::AlongRay extinction(m_medium, ray.origin, ray.direction);
+    Light transmittance(1.0f);
+    const auto extinction = m_medium.alongRay(ray.origin, ray.direction, when);
     const float offset = rng.uniform();
     float done = 0.0f;  // the ray is integrated up to here
     for (volume::MajorantGrid::Walk walk(m_medium.majorants(), ray.origin, ray.direction, 0.0f,
@@ -94,11 +121,13 @@ class MarchIntegrator final : public Integrator {
         }
         const float sigma = extinction(0.5f * (t0 + t1));
         if (sigma > 0.0f)
-          transmittance = step({ray, t0, t1}, sigma, transmittance, opacity, result, rng, counters);
+          transmittance =
+              step({ray, t0, t1}, sigma, when, transmittance, opacity, result, rng, counters);
         else if (m_emission)
-          result.emission += transmittance * (t1 - t0) *
-                             m_emission->at(ray.origin + ray.direction * (0.5f * (t0 + t1)));
-        if (transmittance < kOpaque) return 0.0f;
+          result.emission +=
+              transmittance * (t1 - t0) *
+              m_medium.emitted(ray.origin + ray.direction * (0.5f * (t0 + t1)), when);
+        if (transport::largestOf(transmittance) < kOpaque) return Light(0.0f);
         t0 = t1;
       }
       done = std::max(done, t0);
@@ -107,8 +136,9 @@ class MarchIntegrator final : public Integrator {
   }
 
   // A step through extinction.
-  float step(const MarchStep& step, float sigma, float transmittance, RayOpacity* opacity,
-             RayRadiance& result, Rng& rng, IntegratorCounters& counters) const {
+  Light step(const MarchStep& step, float sigma, When when, const Light& transmittance,
+             RayOpacity* opacity, RayRadiance& result, Rng& rng,
+             IntegratorCounters& counters) const {
     const Segment& ray = step.ray;
     const float dx = step.t1 - step.t0;
     const float t = 0.5f * (step.t0 + step.t1);
@@ -118,28 +148,30 @@ class MarchIntegrator final : public Integrator {
       c.extinction = sigma;
       c.scattering[0] = sigma * *albedo;
     } else {
-      m_medium.coefficients(p, c);
+      m_medium.coefficients(p, c, when);
       // The same place, but for rounding.
       if (!(c.extinction > 0.0f)) return transmittance;
     }
-    const float depth = c.extinction * dx;
-    // (1 - exp(-x)) / x, its series where the difference would cancel.
-    const float attenuated = fastExp(-depth);
-    const float average = depth > 1e-3f ? (1.0f - attenuated) / depth : 1.0f - 0.5f * depth;
-    const float weight = transmittance * average * dx;
+    const Light own = transport::extinctionFor(static_cast<const Light*>(nullptr), m_medium, p,
+                                               c.extinction, when);
+    const Light depth = own * dx;
+    const Light attenuated = exponential(-depth);
+    const Light average = averaged(depth, attenuated);
+    const Light weight = transmittance * average * dx;
     const Vec3f wo = -ray.direction;
-    if (m_emission) result.emission += weight * m_emission->at(p);
+    if (m_emission) result.emission += weight * m_medium.emitted(p, when);
     if (m_options.effects.singleScattering)
-      result.single += weight * m_direct.at(p, wo, c, &step, rng, counters);
+      result.single += weight * m_direct.at<Light>(p, wo, c, &step, rng, counters, when);
     if (m_source && !(m_gather && !m_source->carriesUnscattered())) {
       const estimators::Inscatter in = m_source->at(p, wo, c);
       result.single += weight * in.single;
       result.multiple += weight * in.multiple;
     }
-    const float absorbed = transmittance * average * depth;
+    const Light removed = transmittance * average * depth;
+    const float absorbed = meanOf(removed);
     result.opacity += absorbed;
     result.depth += absorbed * (static_cast<float>(ray.begin) + t);
-    if (opacity) opacity->add(step.t0, step.t1, c.extinction, result.opacity);
+    if (opacity) opacity->add(step.t0, step.t1, meanOf(own), result.opacity, Rgb(removed));
     return transmittance * attenuated;
   }
 
@@ -161,7 +193,13 @@ std::unique_ptr<Integrator> makeMarchIntegrator(const Medium& medium,
                                                 const Shadows& shadows,
                                                 const estimators::InscatterSource* source,
                                                 const MarchOptions& options) {
-  return std::make_unique<MarchIntegrator>(medium, lights, shadows, source, options);
+  const auto make = [&]<class Light, class When>(Light, When) -> std::unique_ptr<Integrator> {
+    return std::make_unique<MarchIntegrator<Light, When>>(medium, lights, shadows, source, options);
+  };
+  if (medium.isMoving())
+    return medium.isColoured() ? make(Rgb(), transport::Moment())
+                               : make(float(), transport::Moment());
+  return medium.isColoured() ? make(Rgb(), transport::Still()) : make(float(), transport::Still());
 }
 
 }  // namespace photosphere::render

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <type_traits>
 
 #include "photosphere/render/integrator.h"
 #include "photosphere/transport/scatter.h"
@@ -12,6 +13,9 @@ using transport::Collision;
 using transport::Medium;
 using transport::Segment;
 
+// Light is what transmittances are made of: float, or Rgb where extinction differs from channel to
+// channel. When is Still, or Moment where the smoke moves.
+template <class Light, class When>
 class PathIntegrator final : public Integrator {
  public:
   PathIntegrator(const Medium& medium, const transport::LightList& lights,
@@ -36,58 +40,88 @@ class PathIntegrator final : public Integrator {
     if (!(sum > 0)) m_sampled.clear();
   }
 
-  RayRadiance radiance(const Vec3d& origin, const Vec3f& direction, Rng& rng,
-                       IntegratorCounters& counters) const override {
+  RayRadiance radiance(const Vec3d& origin, const Vec3f& direction, transport::Moment moment,
+                       Rng& rng, IntegratorCounters& counters) const override {
+    When when;
+    if constexpr (std::is_same_v<When, transport::Moment>) when = moment;
     RayRadiance result;
     Segment segment = transport::clipToMedium(m_medium, origin, direction,
                                               std::numeric_limits<double>::infinity());
     Rgb throughput(1.0f);
-    for (int scatterings = 0;; ++scatterings) {
+    bool first = true;
+    for (int scatterings = 0;;) {
       Collision hit;
-      if (scatterings == 0 && segment.length > 0.0f) {
-        float transmittance = 1.0f;
+      if (first && segment.length > 0.0f) {
+        Light transmittance(1.0f);
         hit = transport::sampleCollisionAndTransmittance(m_medium, segment.origin,
                                                          segment.direction, segment.length, rng,
-                                                         counters.tracking, transmittance);
+                                                         counters.tracking, transmittance, when);
         result.transmittance = Rgb(transmittance);
       } else if (segment.length > 0.0f) {
         hit = transport::sampleCollision(m_medium, segment.origin, segment.direction,
-                                         segment.length, rng, counters.tracking);
+                                         segment.length, rng, counters.tracking, when);
       }
+      first = false;
       if (m_emission && segment.length > 0.0f)
-        addEmission(result, throughput, segment, hit, scatterings, rng);
+        addEmission(result, throughput, segment, hit, scatterings, rng, when);
       if (!hit.happened()) {
         const Vec3f d = scatterings == 0 ? direction : segment.direction;
         addEscape(result, throughput, d, scatterings);
         return result;
       }
       if (scatterings == 0) {
-        result.depth = static_cast<float>(segment.begin) + hit.distance;
-        result.opacity = 1.0f;
+        const auto begin = static_cast<float>(segment.begin);
+        addDepth(result, throughput, begin + hit.distance,
+                 segment.origin + segment.direction * hit.distance, hit.extinction, when);
       }
       ++counters.scatterings;
       const Vec3f p = segment.origin + segment.direction * hit.distance;
       if (!m_options.effects.singleScattering && !m_options.effects.multipleScattering)
         return result;
-      if (m_options.maxScatter > 0 && scatterings >= m_options.maxScatter) {
-        ++counters.capped;
-        counters.cappedRadiance += static_cast<double>(meanComponent(throughput));
-        return result;
-      }
-      addNextEvent(result, throughput, p, segment.direction, scatterings, rng, counters);
-      const transport::ScatterEvent event = transport::scatter(m_medium, p, segment.direction, rng);
+      const bool last = m_options.maxScatter > 0 && scatterings >= m_options.maxScatter;
+      // Where channels differ, light may still pass what stands for a collision.
+      if (last && std::is_same_v<Light, float>) return capped(result, throughput, counters);
+      if (!last)
+        addNextEvent(result, throughput, p, segment.direction, scatterings, rng, counters, when);
+      const transport::ScatterEvent event =
+          transport::scatter(m_medium, p, segment.direction, throughput, rng, when);
       if (!event.survived) return result;
+      if (last && event.scattered) return capped(result, throughput, counters);
       throughput *= event.weight;
+      if constexpr (!std::is_same_v<Light, float>)
+        if (!event.scattered) {
+          segment = {p, segment.direction, kInfinity,
+                     segment.begin + static_cast<double>(hit.distance)};
+          continue;
+        }
       if (static_cast<std::uint32_t>(scatterings) >= transport::kLongPath) {
         if (!(rng.uniform() < 0.999f)) return result;
         throughput *= 1.0f / 0.999f;
       }
       // From inside, the walk over the majorants ends where the medium does.
       segment = {p, event.direction, kInfinity, 0.0};
+      ++scatterings;
     }
   }
 
  private:
+  static RayRadiance capped(const RayRadiance& result, const Rgb& throughput,
+                            IntegratorCounters& counters) {
+    ++counters.capped;
+    counters.cappedRadiance += static_cast<double>(meanComponent(throughput));
+    return result;
+  }
+
+  // Distance of what the eye meets first, weighted by what a channel meets there on the mean.
+  void addDepth(RayRadiance& result, const Rgb& throughput, float distance, const Vec3f& p,
+                float extinction, When when) const {
+    float met = 1.0f;
+    if constexpr (!std::is_same_v<Light, float>)
+      met = meanComponent(throughput * m_medium.channels(p, extinction, when)) / extinction;
+    result.depth += met * distance;
+    result.opacity += met;
+  }
+
   static void add(RayRadiance& result, const Rgb& value, int scatterings) {
     (scatterings == 1 ? result.single : result.multiple) += value;
   }
@@ -95,11 +129,11 @@ class PathIntegrator final : public Integrator {
   // Light that the smoke gives off along the flight: the `emission` layer where the eye sees it,
   // else scattered at least once, which is `multiple` (`single` is the lamps').
   void addEmission(RayRadiance& result, const Rgb& throughput, const Segment& flight,
-                   const Collision& hit, int scatterings, Rng& rng) const {
+                   const Collision& hit, int scatterings, Rng& rng, When when) const {
     const float length = hit.happened() ? hit.distance : flight.length;
     (scatterings == 0 ? result.emission : result.multiple) +=
         throughput * transport::sampleEmission(m_medium, *m_emission, flight.origin,
-                                               flight.direction, length, rng);
+                                               flight.direction, length, rng, when);
   }
 
   // Light that the path meets by leaving the smoke after this many scatterings.
@@ -116,7 +150,7 @@ class PathIntegrator final : public Integrator {
 
   // Light of one lamp, chosen by power, that scatters here toward the eye.
   void addNextEvent(RayRadiance& result, const Rgb& throughput, const Vec3f& p, const Vec3f& d,
-                    int scatterings, Rng& rng, IntegratorCounters& counters) const {
+                    int scatterings, Rng& rng, IntegratorCounters& counters, When when) const {
     if (m_sampled.empty()) return;
     std::size_t i = 0;
     double probability = 1.0;
@@ -131,22 +165,23 @@ class PathIntegrator final : public Integrator {
     const Vec2f u = light.isDelta() ? Vec2f(0.5f) : rng.uniform2();
     const lights::Illumination in = light.illuminate(p, u);
     if (!(maxComponent(in.irradiance) > 0.0f)) return;
-    const Rgb scattered = phaseAlbedo(p, in.direction, -d);
-    const float transmittance = m_options.effects.shadows ? transport::trackTransmittance(
-                                                                m_medium, p, -in.direction,
-                                                                in.distance, rng, counters.tracking)
-                                                          : 1.0f;
+    const Rgb scattered = phaseAlbedo(p, in.direction, -d, when);
+    const Light transmittance =
+        m_options.effects.shadows
+            ? transport::trackTransmittance<Light>(m_medium, p, -in.direction, in.distance, rng,
+                                                   counters.tracking, when)
+            : Light(1.0f);
     add(result,
         throughput * scattered * in.irradiance * (transmittance / static_cast<float>(probability)),
         scatterings + 1);
   }
 
-  // Sum over phase functions of sigma_s / sigma_t times the phase.
-  Rgb phaseAlbedo(const Vec3f& p, const Vec3f& wi, const Vec3f& wo) const {
+  // Sum over phase functions of sigma_s over the rate of collisions times the phase.
+  Rgb phaseAlbedo(const Vec3f& p, const Vec3f& wi, const Vec3f& wo, When when) const {
     const auto& phases = m_medium.phases();
     if (const Rgb* uniform = m_medium.uniformAlbedo()) return *uniform * phases[0].evaluate(wi, wo);
     Coefficients c;
-    m_medium.coefficients(p, c);
+    m_medium.coefficients(p, c, when);
     Rgb sum(0.0f);
     for (std::size_t i = 0; i < phases.size(); ++i)
       sum += c.scattering[i] * phases[i].evaluate(wi, wo);
@@ -167,7 +202,13 @@ class PathIntegrator final : public Integrator {
 std::unique_ptr<Integrator> makePathIntegrator(const Medium& medium,
                                                const transport::LightList& lights,
                                                const PathOptions& options) {
-  return std::make_unique<PathIntegrator>(medium, lights, options);
+  const auto make = [&]<class Light, class When>(Light, When) -> std::unique_ptr<Integrator> {
+    return std::make_unique<PathIntegrator<Light, When>>(medium, lights, options);
+  };
+  if (medium.isMoving())
+    return medium.isColoured() ? make(Rgb(), transport::Moment())
+                               : make(float(), transport::Moment());
+  return medium.isColoured() ? make(Rgb(), transport::Still()) : make(float(), transport::Still());
 }
 
 }  // namespace photosphere::render

@@ -1,5 +1,7 @@
 #include "photosphere/render/shadows.h"
 
+#include <cmath>
+
 #include "light_depth.h"
 #include "photosphere/core/log.h"
 #include "photosphere/core/resources.h"
@@ -19,24 +21,38 @@ bool besideSmoke(const transport::SupportLattice& lattice, const Vec3i& node) {
   return false;
 }
 
+// Times of the shutter at which grids are made: about one for each voxel that the smoke moves.
+constexpr double kMostTimes = 9;
+
+float attenuated(float depth) {
+  return fastExp(-depth);
+}
+Rgb attenuated(const Rgb& depth) {
+  return {fastExp(-depth.x), fastExp(-depth.y), fastExp(-depth.z)};
+}
+
 }  // namespace
 
 Shadows::Shadows(const Medium& medium, const transport::LightList& lights, ShadowMode mode,
                  float step, std::uint64_t budgetBytes)
-    : m_medium(&medium),
-      m_mode(mode),
-      m_step(step),
-      m_depths(lights.size()),
-      m_tables(lights.size()) {
+    : m_medium(&medium), m_mode(mode), m_step(step), m_tabulated(lights.size()) {
   if (mode != ShadowMode::grid || medium.bounds().empty()) return;
+  if (medium.isMoving()) {
+    const transport::Shutter& shutter = medium.shutter();
+    const double moves = medium.displacement() / shutter.longest() * (shutter.close - shutter.open);
+    m_times = static_cast<std::size_t>(
+        std::clamp(std::ceil(moves / medium.voxelEdge()) + 1, 2.0, kMostTimes));
+  }
+  if (medium.isColoured() && !medium.tint()) m_channels = 3;
+  const std::vector<Layer> wanted = layers();
   std::optional<transport::SupportLattice> lattice;
   for (std::size_t i = 0; i < lights.size(); ++i) {
     if (!lights[i]->isDelta()) continue;
-    std::optional<LightDepth> depth = LightDepth::plan(medium, *lights[i]);
+    const std::optional<LightDepth> depth = LightDepth::plan(medium, *lights[i]);
     if (!depth && !lattice) lattice.emplace(medium, medium.voxelEdge(), 0);
-    const std::uint64_t bytes =
-        depth ? depth->predictedBytes()
-              : lattice->activeBricks().size() * Field::kBrickSize * sizeof(float);
+    const std::uint64_t bytes = wanted.size() * (depth ? depth->predictedBytes()
+                                                       : lattice->activeBricks().size() *
+                                                             Field::kBrickSize * sizeof(float));
     if (budgetBytes && memoryBytes() + bytes > budgetBytes) {
       log::warning(
           "light '{}': its shadow grid of {} passes the memory budget; its shadows are marched "
@@ -44,19 +60,48 @@ Shadows::Shadows(const Medium& medium, const transport::LightList& lights, Shado
           lights[i]->name(), formatBytes(bytes));
       continue;
     }
-    if (depth) {
-      depth->fill(medium, step);
-      m_depths[i] = std::make_unique<LightDepth>(std::move(*depth));
-    } else {
-      m_tables[i] = uprightTable(*lights[i], *lattice);
-    }
+    for (const Layer& layer : wanted)
+      if (depth) {
+        m_tabulated[i].depths.push_back(*depth);
+        m_tabulated[i].depths.back().fill(medium, step, layer.channel, layer.when);
+      } else {
+        m_tabulated[i].tables.push_back(uprightTable(*lights[i], *lattice, layer));
+      }
   }
 }
 
 Shadows::~Shadows() = default;
 
+std::vector<Shadows::Layer> Shadows::layers() const {
+  const transport::Shutter& shutter = m_medium->shutter();
+  std::vector<Layer> all;
+  for (std::size_t t = 0; t < m_times; ++t)
+    for (std::size_t c = 0; c < m_channels; ++c) {
+      Layer layer;
+      if (m_channels > 1) layer.channel = static_cast<int>(c);
+      if (m_times > 1)
+        layer.when = transport::Moment{static_cast<float>(
+            shutter.open + (shutter.close - shutter.open) * static_cast<double>(t) /
+                               static_cast<double>(m_times - 1))};
+      all.push_back(layer);
+    }
+  return all;
+}
+
+float Shadows::marchedDepth(const Segment& toLight, const Layer& layer) const {
+  const auto sum = [&](auto when) {
+    if (layer.channel < 0)
+      return transport::marchOpticalDepth(*m_medium, toLight.origin, toLight.direction,
+                                          toLight.length, m_step, when);
+    return transport::marchOpticalDepth<Rgb>(*m_medium, toLight.origin, toLight.direction,
+                                             toLight.length, m_step, when)[layer.channel];
+  };
+  return layer.when ? sum(*layer.when) : sum(transport::Still{});
+}
+
 Shadows::Table Shadows::uprightTable(const lights::Light& light,
-                                     const transport::SupportLattice& lattice) const {
+                                     const transport::SupportLattice& lattice,
+                                     const Layer& layer) const {
   const double pitch = lattice.edge();
   auto fetch = [&](const Vec3i& brick, float* depth) {
     bool lit = false;
@@ -73,10 +118,7 @@ Shadows::Table Shadows::uprightTable(const lights::Light& light,
           lit = lit || maxComponent(in.irradiance) > 0.0f;
           const Segment toLight = transport::clipToMedium(*m_medium, p, -in.direction,
                                                           static_cast<double>(in.distance));
-          *depth++ = toLight.length > 0.0f
-                         ? transport::marchOpticalDepth(*m_medium, toLight.origin,
-                                                        toLight.direction, toLight.length, m_step)
-                         : 0.0f;
+          *depth++ = toLight.length > 0.0f ? marchedDepth(toLight, layer) : 0.0f;
         }
     // No node of this brick sees the lamp, so nothing in it is ever looked up with a weight.
     if (!lit) std::fill_n(depth - Field::kBrickSize, Field::kBrickSize, 0.0f);
@@ -85,29 +127,68 @@ Shadows::Table Shadows::uprightTable(const lights::Light& light,
           static_cast<float>(1.0 / pitch)};
 }
 
-float Shadows::transmittance(std::size_t light, const Vec3f& p, const Vec3f& direction,
-                             float distance, Rng& rng,
-                             transport::TrackingCounters& counters) const {
+template <class Grids, class Light, class When>
+Light Shadows::depthIn(const Grids& grids, const Vec3f& p, const Light*, When when) const {
+  // Of one time: one number, that times the colour that all volumes share, or three.
+  const auto at = [&](std::size_t time) -> Light {
+    const auto* grid = grids.data() + time * m_channels;
+    if constexpr (std::is_same_v<Light, float>)
+      return grid->at(p);
+    else
+      return m_channels == 1 ? grid->at(p) * *m_medium->tint()
+                             : Rgb(grid[0].at(p), grid[1].at(p), grid[2].at(p));
+  };
+  if constexpr (std::is_same_v<When, transport::Still>) {
+    return at(0);
+  } else {
+    if (m_times == 1) return at(0);
+    const transport::Shutter& shutter = m_medium->shutter();
+    const double span = std::max(shutter.close - shutter.open, 1e-30);
+    const auto place = static_cast<float>((static_cast<double>(when.seconds) - shutter.open) /
+                                          span * static_cast<double>(m_times - 1));
+    const auto first = std::min(static_cast<std::size_t>(std::max(place, 0.0f)), m_times - 2);
+    const float part = std::clamp(place - static_cast<float>(first), 0.0f, 1.0f);
+    return at(first) * (1.0f - part) + at(first + 1) * part;
+  }
+}
+
+template <class Light, class When>
+Light Shadows::transmittance(std::size_t light, const Vec3f& p, const Vec3f& direction,
+                             float distance, Rng& rng, transport::TrackingCounters& counters,
+                             When when) const {
+  constexpr const Light* kind = nullptr;
   // The optical depth is interpolated, not the transmittance: it is linear where smoke is even.
-  if (const auto& depth = m_depths[light]) return fastExp(-depth->at(p));
-  if (const std::optional<Table>& table = m_tables[light])
-    return fastExp(-table->opticalDepth.sample((p - table->origin) * table->inversePitch));
+  const Tabulated& grids = m_tabulated[light];
+  if (!grids.depths.empty()) return attenuated(depthIn(grids.depths, p, kind, when));
+  if (!grids.tables.empty()) return attenuated(depthIn(grids.tables, p, kind, when));
   const Segment toLight =
       transport::clipToMedium(*m_medium, Vec3d(p), -direction, static_cast<double>(distance));
-  if (!(toLight.length > 0.0f)) return 1.0f;
+  if (!(toLight.length > 0.0f)) return Light(1.0f);
   if (m_mode == ShadowMode::track)
-    return transport::trackTransmittance(*m_medium, toLight.origin, toLight.direction,
-                                         toLight.length, rng, counters);
-  return fastExp(-transport::marchOpticalDepth(*m_medium, toLight.origin, toLight.direction,
-                                               toLight.length, m_step));
+    return transport::trackTransmittance<Light>(*m_medium, toLight.origin, toLight.direction,
+                                                toLight.length, rng, counters, when);
+  return attenuated(transport::marchOpticalDepth<Light>(
+      *m_medium, toLight.origin, toLight.direction, toLight.length, m_step, when));
 }
+
+#define PHOTOSPHERE_SHADOWS(LIGHT, WHEN)                                                        \
+  template LIGHT Shadows::transmittance<LIGHT, WHEN>(                                           \
+      std::size_t, const Vec3f&, const Vec3f&, float, Rng&, transport::TrackingCounters&, WHEN) \
+      const;
+PHOTOSPHERE_SHADOWS(float, transport::Still)
+PHOTOSPHERE_SHADOWS(float, transport::Moment)
+PHOTOSPHERE_SHADOWS(Rgb, transport::Still)
+PHOTOSPHERE_SHADOWS(Rgb, transport::Moment)
+#undef PHOTOSPHERE_SHADOWS
 
 std::uint64_t Shadows::memoryBytes() const {
   std::uint64_t bytes = 0;
-  for (const auto& depth : m_depths)
-    if (depth) bytes += depth->memoryBytes();
-  for (const auto& table : m_tables)
-    if (table) bytes += table->opticalDepth.memoryBytes();
+  for (const Tabulated& grids : m_tabulated) {
+    for (const LightDepth& depth : grids.depths)
+      bytes += depth.memoryBytes();
+    for (const Table& table : grids.tables)
+      bytes += table.opticalDepth.memoryBytes();
+  }
   return bytes;
 }
 

@@ -75,6 +75,8 @@ class EffectPlan {
     e.multipleScattering = multiple.on;
     Decision shadows = this->shadows();
     e.shadows = shadows.on;
+    const Decision motion = motionBlur();
+    e.motionBlur = motion.on;
     depthOfField(lens);
 
     note("emission", emission);
@@ -82,7 +84,7 @@ class EffectPlan {
     note("multiple_scattering", multiple);
     note("shadows", shadows);
     chromatic();
-    motionBlur();
+    note("motion_blur", motion);
     note("depth_of_field", lens);
     note("environment", m_environment);
     note("lights", lamps);
@@ -236,11 +238,12 @@ class EffectPlan {
     const std::optional<double> bound =
         afford(m_bounds->glow() + (m_scatters ? m_bounds->scatteredGlow() : 0.0));
     if (!bound) return decision;
+    const transport::Shutter shutter = m_setup.medium->shutter();
     // Nothing is left that births photons or fills bricks.
     std::vector<transport::MediumVolume> volumes = std::move(*m_setup.medium).takeVolumes();
     for (transport::MediumVolume& volume : volumes)
       volume.emission = {};
-    m_setup.medium = std::make_unique<transport::Medium>(std::move(volumes));
+    m_setup.medium = std::make_unique<transport::Medium>(std::move(volumes), shutter);
     return {false, "the smoke's glow is " + share(*bound), bound};
   }
   std::string darkEmission() const {
@@ -260,7 +263,49 @@ class EffectPlan {
     return decision;
   }
 
-  void motionBlur() { note("motion_blur", {false, "no volume has a velocity", 0.0}); }
+  // Off where the smoke moves light by less than shows, as depth of field is.
+  Decision motionBlur() {
+    if (isOff("motion_blur")) return {false, "off in the scene"};
+    const transport::Medium& medium = *m_setup.medium;
+    if (!medium.isMoving()) {
+      std::string why = "no volume has a velocity";
+      for (const VolumeEntry& volume : m_scene.volumes)
+        if (!volume.values.text("velocity").empty())
+          why = "no smoke moves while the shutter is open";
+      return unlessNever("motion_blur", why, "");
+    }
+    const double pixels = medium.displacement() / m_setup.space.metersPerUnit * pixelsPerUnit();
+    const std::string why =
+        fmt::format("the smoke moves by up to {:.2g} pixels while the shutter is open", pixels);
+    if (isOn("motion_blur") || m_forOtherViews) return {true, why};
+    const std::optional<double> bound = affordShift(pixels);
+    if (!bound) return {true, why};
+    *m_setup.medium = std::move(*m_setup.medium).held();
+    return {false, fmt::format("{}, {}", why, share(*bound)), bound};
+  }
+  // Of the nearest smoke, in any direction [pixels per scene unit].
+  double pixelsPerUnit() const {
+    const cameras::Camera& camera = *m_setup.camera;
+    const double width = camera.resolution().x;
+    const Box3d& box = m_setup.worldBounds;
+    if (!camera.hasEye())
+      return 1 / glm::length(camera.ray({1, 0}).origin - camera.ray({0, 0}).origin);
+    const Vec3d nearest = glm::clamp(camera.position(), box.min, box.max);
+    const double distance = std::max(glm::length(nearest - camera.position()), 1e-9);
+    return camera.isPanorama()
+               ? width / (2 * kPi * distance)
+               : width / (2 * std::tan(horizontalFov(m_scene.camera) * kPi / 360) * distance);
+  }
+  // The same for light that is seen up to so many pixels from where it would be: the picture
+  // differs there by no more than its steepest step times that way along either axis.
+  std::optional<double> affordShift(double pixels) {
+    if (!m_bounds || !(m_tolerance > m_spent)) return std::nullopt;
+    const double mean = picture().meanRadiance;
+    const double bound = kSafety * std::sqrt(2.0) * pixels * picture().steepest / mean;
+    if (!(mean > 0) || !(bound <= m_tolerance - m_spent)) return std::nullopt;
+    m_spent += bound;
+    return bound;
+  }
 
   // Why there is no lens; otherwise it is on, and the frame has it.
   Decision prepareLens() {
@@ -274,19 +319,11 @@ class EffectPlan {
                               widestBlur(m_setup.lens))};
   }
 
-  // Off where the widest blur moves light by less than shows: a pixel is the mean of what lies
-  // within half of it, where the picture differs by no more than its steepest step a pixel times
-  // that way along either axis.
+  // A pixel is the mean of what lies within half of the widest blur.
   void depthOfField(Decision& lens) {
-    if (lens.on && m_bounds && !isOn("depth_of_field") && m_tolerance > m_spent) {
-      const double mean = picture().meanRadiance;
-      const double most =
-          kSafety * std::sqrt(2.0) * 0.5 * widestBlur(m_setup.lens) * picture().steepest;
-      if (mean > 0 && most / mean <= m_tolerance - m_spent) {
-        m_spent += most / mean;
-        lens = {false, fmt::format("{}, {}", lens.why, share(most / mean)), most / mean};
-      }
-    }
+    if (lens.on && !isOn("depth_of_field"))
+      if (const std::optional<double> bound = affordShift(0.5 * widestBlur(m_setup.lens)))
+        lens = {false, fmt::format("{}, {}", lens.why, share(*bound)), bound};
     m_setup.effects.depthOfField = lens.on;
     if (!lens.on) m_setup.lens = {};
   }
@@ -324,7 +361,9 @@ class EffectPlan {
   }
 
   void chromatic() {
-    std::string coloured = m_setup.medium->isGrey() ? "" : "an albedo is coloured";
+    std::string coloured = m_setup.medium->isColoured() ? "extinction is coloured"
+                           : m_setup.medium->isGrey()   ? ""
+                                                        : "an albedo is coloured";
     const transport::Emission* emission = m_setup.medium->emission();
     if (emission && !emission->isGrey()) coloured = "the emission is coloured";
     for (const auto& light : m_setup.lights)
@@ -335,7 +374,8 @@ class EffectPlan {
                       "hold that, so make it grey or leave chromatic at auto",
                       coloured));
     const Decision decision = unlessNever(
-        "chromatic", coloured.empty() ? "lights, albedos and emission are grey" : "", coloured);
+        "chromatic", coloured.empty() ? "lights, extinction, albedos and emission are grey" : "",
+        coloured);
     m_setup.effects.chromatic = decision.on;
     note("chromatic", decision);
   }

@@ -118,6 +118,8 @@ render::FrameOptions frameOptions(const SceneFile& scene, const render::Crop& cr
   options.crop = crop;
   options.space = setup.space;
   options.lens = setup.lens;
+  options.moving = setup.medium->isMoving();
+  options.shutter = setup.medium->shutter();
   return options;
 }
 

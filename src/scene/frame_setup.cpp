@@ -14,6 +14,8 @@
 #include "photosphere/core/resources.h"
 #include "photosphere/phase/phase.h"
 #include "photosphere/volume/rasterize.h"
+#include "photosphere/volume/vdb_file.h"
+#include "photosphere/volume/velocity.h"
 #include "smoke_source.h"
 #include "volume_emission.h"
 
@@ -24,6 +26,8 @@ namespace {
 // Independent parts of a frame whose error is estimated: the relative standard error of a variance
 // from eight is about a half, but the mean of it over pixels is far better.
 constexpr int kErrorBatches = 8;
+// Voxels that a velocity is carried on beyond those that the cache has.
+constexpr double kMostMargin = 48;
 
 Mat4d localFromWorld(const lights::LocalSpace& space) {
   Mat4d m(space.metersPerUnit);
@@ -64,6 +68,40 @@ void dropEqualChannels(std::vector<volume::BrickField<float>>& fields) {
     fields.resize(1);
 }
 
+// Largest of [r, g, b].
+double largestScale(const VolumeEntry& entry) {
+  return maxComponent(entry.values.vec3("density_scale"));
+}
+
+// The densest channel's, and what the others have of it.
+void setExtinction(const VolumeEntry& entry, transport::MediumVolume& placed) {
+  placed.densityScale = largestScale(entry);
+  if (placed.densityScale > 0)
+    placed.tint = Rgb(entry.values.vec3("density_scale") / placed.densityScale);
+}
+
+// Velocity in local space, wide enough for all that moves while the shutter is open.
+transport::VolumeMotion placeMotion(const VolumeSource& source, const lights::LocalSpace& space,
+                                    const transport::Shutter& shutter, std::uint64_t budget) {
+  transport::VolumeMotion motion;
+  if (!source.velocity || !(shutter.longest() > 0)) return motion;
+  const Mat3d linear(localFromWorld(space) * source.worldFromFile);
+  const Mat4d localFromIndex = localFromWorld(space) * source.worldFromIndex(source.velocity);
+  const double raw = volume::statistics(source.velocity).max;
+  const double longest =
+      std::max({glm::length(linear[0]), glm::length(linear[1]), glm::length(linear[2])});
+  const double voxels = raw * longest * shutter.longest() / volume::finestSpacing(localFromIndex);
+  const int margin = static_cast<int>(std::min(std::ceil(voxels) + 1, kMostMargin));
+  const volume::Grid grid =
+      volume::velocityForLookups(source.velocity, linear, margin, source.path);
+  motion.velocity = volume::vectorBricksFromGrid(grid, source.path, budget);
+  motion.localFromNode = localFromIndex * nodeShift(motion.velocity.origin());
+  volume::forEachNode(motion.velocity, [&](const Vec4f& v) {
+    motion.fastest = std::max(motion.fastest, glm::length(Vec3d(v)));
+  });
+  return motion;
+}
+
 transport::MediumVolume placeVolume(const VolumeEntry& entry, const VolumeSource& source,
                                     const lights::LocalSpace& space, std::uint64_t budget) {
   transport::MediumVolume placed;
@@ -72,7 +110,7 @@ transport::MediumVolume placeVolume(const VolumeEntry& entry, const VolumeSource
   placed.density = volume::bricksFromGrid(source.density, 0, source.path, false, budget);
   placed.localFromNode = localFromWorld(space) * source.worldFromIndex(source.density) *
                          nodeShift(placed.density.origin());
-  placed.densityScale = entry.values.vec3("density_scale").x;
+  setExtinction(entry, placed);
   placed.albedo = entry.values.rgb("albedo");
   if (source.albedo) {
     const int components = source.albedo.kind() == volume::GridKind::vector ? 3 : 1;
@@ -99,8 +137,9 @@ void buildMedium(const SceneFile& scene, std::int64_t cacheFrame, bool wantParti
                  FrameSetup& setup) {
   std::vector<VolumeSource> sources;
   const bool glows = scene.effects.text("emission") != "off";
+  const bool moves = scene.effects.text("motion_blur") != "off";
   for (const VolumeEntry& entry : scene.volumes) {
-    sources.push_back(readVolume(scene, entry, cacheFrame, wantParticles, glows));
+    sources.push_back(readVolume(scene, entry, cacheFrame, {wantParticles, glows, moves}));
     setup.readSeconds += sources.back().readSeconds;
     setup.rasterizeSeconds += sources.back().rasterizeSeconds;
     setup.worldBounds.grow(sources.back().bounds());
@@ -111,12 +150,13 @@ void buildMedium(const SceneFile& scene, std::int64_t cacheFrame, bool wantParti
   if (!setup.worldBounds.empty()) setup.space.center = setup.worldBounds.center();
 
   const Stopwatch watch;
+  const Vec2d frames = scene.camera.vec2("shutter") / scene.scene.real("fps");
+  const transport::Shutter shutter{frames.x, frames.y};
   std::vector<transport::MediumVolume> placed;
   for (std::size_t i = 0; i < sources.size(); ++i) {
     for (const Vec3d& p : sources[i].particles)
       setup.particles.emplace_back(setup.space.localFromWorld(p));
-    const double scale = scene.volumes[i].values.vec3("density_scale").x;
-    if (!visible(sources[i], scale)) {
+    if (!visible(sources[i], largestScale(scene.volumes[i]))) {
       setup.notes.push_back(fmt::format("{}: no smoke in it at this frame", sources[i].path));
       continue;
     }
@@ -125,9 +165,10 @@ void buildMedium(const SceneFile& scene, std::int64_t cacheFrame, bool wantParti
       placed.back().emission =
           placeEmission(scene.volumes[i], sources[i], localFromWorld(setup.space),
                         scene.output.text("colorspace"), setup.memoryBudget, setup.notes);
+    placed.back().motion = placeMotion(sources[i], setup.space, shutter, setup.memoryBudget);
     if (placed.back().density.empty() && placed.back().emission.field.empty()) placed.pop_back();
   }
-  setup.medium = std::make_unique<transport::Medium>(std::move(placed));
+  setup.medium = std::make_unique<transport::Medium>(std::move(placed), shutter);
   // Active voxels may hold zeros: what frames the smoke is the box of what scatters or emits.
   setup.worldBounds = Box3d();
   if (const Box3d& local = setup.medium->bounds(); !local.empty()) {

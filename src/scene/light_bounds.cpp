@@ -116,24 +116,52 @@ double DepthBound::within(const DirectionCone& cone) const {
   return least;
 }
 
-double largestMeanDepth(const transport::Medium& medium) {
-  double depth = 0;
-  for (const transport::MediumVolume& v : medium.volumes()) {
-    // Volume of the cells by their extinction, in steps of an eighth of an octave.
-    std::map<int, double> space;
-    const double cell = std::abs(glm::determinant(Mat3d(v.localFromNode)));
-    volume::forEachCell(v.density, [&](const Vec3i&, int edge, float most) {
-      const double sigma = v.densityScale * static_cast<double>(most);
-      if (sigma > 0)
-        space[static_cast<int>(std::floor(8 * std::log2(sigma)))] += cell * edge * edge * edge;
-    });
-    double filled = 0, inner = 0;
-    for (auto step = space.rbegin(); step != space.rend(); ++step) {
+namespace {
+
+// Volume of the smoke by its extinction [m^3], in steps of an eighth of an octave.
+class Shells {
+ public:
+  void add(double sigma, double volume) {
+    if (sigma > 0) m_volumes[static_cast<int>(std::floor(8 * std::log2(sigma)))] += volume;
+  }
+  // Through the ball that it fills, thinner outward, from its middle.
+  double depth() const {
+    double sum = 0, filled = 0, inner = 0;
+    for (auto step = m_volumes.rbegin(); step != m_volumes.rend(); ++step) {
       filled += step->second;
       const double outer = std::cbrt(filled * 3 / (4 * kPi));
-      depth += std::exp2((step->first + 1) / 8.0) * (outer - inner);
+      sum += std::exp2((step->first + 1) / 8.0) * (outer - inner);
       inner = outer;
     }
+    return sum;
+  }
+
+ private:
+  std::map<int, double> m_volumes;
+};
+
+}  // namespace
+
+double largestMeanDepth(const transport::Medium& medium) {
+  double depth = 0;
+  if (medium.isMoving()) {
+    // Motion may draw smoke together: what holds at every time are the majorants.
+    const volume::MajorantGrid& majorants = medium.majorants();
+    const Vec3d size(majorants.cellSize());
+    Shells shells;
+    for (int z = 0; z < majorants.dims().z; ++z)
+      for (int y = 0; y < majorants.dims().y; ++y)
+        for (int x = 0; x < majorants.dims().x; ++x)
+          shells.add(static_cast<double>(majorants.majorant({x, y, z})), size.x * size.y * size.z);
+    return shells.depth();
+  }
+  for (const transport::MediumVolume& v : medium.volumes()) {
+    Shells shells;
+    const double cell = std::abs(glm::determinant(Mat3d(v.localFromNode)));
+    volume::forEachCell(v.density, [&](const Vec3i&, int edge, float most) {
+      shells.add(v.densityScale * static_cast<double>(most), cell * edge * edge * edge);
+    });
+    depth += shells.depth();
   }
   return depth;
 }

@@ -54,7 +54,7 @@ PreRender preRender(const FrameSetup& setup, const Effects& effects) {
         Rng rng(RandomKey{}, RandomStream::camera, std::uint64_t{0xfffffe} << 40 | i);
         const cameras::CameraRay ray = setup.camera->ray(raster);
         return integrator->radiance(setup.space.localFromWorld(ray.origin), Vec3f(ray.direction),
-                                    rng, counters);
+                                    transport::Moment{}, rng, counters);
       };
       probes[i] = {radiance(at), radiance(at + Vec2d(1, 0)), radiance(at + Vec2d(0, 1))};
     }

@@ -255,11 +255,6 @@ void SceneReader::readVolume(const toml::table& from, std::size_t index) {
     } else {
       entry.values.set(k, hasRow(entry.values, k) ? valueOf(node, k, place) : ParamValue(), place);
     }
-    if (k == "density_scale") {
-      const Vec3d scale = entry.values.vec3(k);
-      if (scale.x != scale.y || scale.y != scale.z)
-        notServed(place, "'density_scale' with unequal channels (coloured extinction)");
-    }
   }
   if (entry.values.text("file").empty())
     throw ConfigError(

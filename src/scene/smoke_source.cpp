@@ -11,6 +11,7 @@
 #include "photosphere/core/resources.h"
 #include "photosphere/volume/rasterize.h"
 #include "photosphere/volume/vdb_file.h"
+#include "photosphere/volume/velocity.h"
 
 namespace photosphere::scene {
 
@@ -65,7 +66,8 @@ volume::ParticleSet pointsOf(const CacheGrids& cache) {
   return volume::gridToPoints(cache.pointGrids.front());
 }
 
-Grid rasterized(const CacheGrids& cache, const VolumeEntry& entry, VolumeSource& source) {
+Grid rasterized(const CacheGrids& cache, const VolumeEntry& entry, bool wantVelocity,
+                VolumeSource& source) {
   const Stopwatch watch;
   volume::RasterizeOptions options;
   options.radius = entry.values.real("particle_radius");
@@ -76,6 +78,8 @@ Grid rasterized(const CacheGrids& cache, const VolumeEntry& entry, VolumeSource&
       fmt::format("{}: {} points rasterized at voxel edge {:.4g}, radius {:.4g} to {:.4g}{}",
                   cache.path, points.size(), result.voxelSize, result.radiusMin, result.radiusMax,
                   result.radiusFromSpacing ? " (from their spacing; they have no pscale)" : ""));
+  if (const std::string& name = entry.values.text("velocity"); wantVelocity && !name.empty())
+    source.velocity = volume::velocityOfParticles(points, name, options, cache.path);
   source.rasterizeSeconds = watch.seconds();
   return result.density;
 }
@@ -135,7 +139,7 @@ Box3d VolumeSource::bounds() const {
 }
 
 VolumeSource readVolume(const SceneFile& scene, const VolumeEntry& entry, std::int64_t frame,
-                        bool wantParticles, bool wantEmission) {
+                        const SourceWishes& wishes) {
   VolumeSource source;
   source.path = framePath(scene.resolvePath(entry.values.text("file")), frame);
   source.worldFromFile =
@@ -155,7 +159,7 @@ VolumeSource readVolume(const SceneFile& scene, const VolumeEntry& entry, std::i
   if (cache.grids.empty() && cache.pointGrids.empty())
     throw InputError(source.path, "holds neither grids nor points");
   if (cache.grids.empty()) {
-    source.density = rasterized(cache, entry, source);
+    source.density = rasterized(cache, entry, wishes.velocity, source);
   } else {
     source.density = findGrid(cache, "density", entry.values.text("density"));
     if (source.density.kind() != GridKind::scalar)
@@ -166,12 +170,21 @@ VolumeSource readVolume(const SceneFile& scene, const VolumeEntry& entry, std::i
     if (entry.values.flag("cell_centered")) source.indexShift = Vec3d(0.5);
   }
   if (source.density) checkAffine(source.path, source.density);
+  if (const std::string& name = entry.values.text("velocity");
+      wishes.velocity && !name.empty() && !cache.grids.empty()) {
+    source.velocity = findGrid(cache, "velocity", name);
+    if (source.velocity.kind() != GridKind::vector)
+      throw InputError(source.path,
+                       fmt::format("grid '{}' is of type {}; a velocity is a vector a voxel", name,
+                                   source.velocity.valueType()));
+    checkAffine(source.path, source.velocity);
+  }
   if (!entry.albedoGrid.empty()) {
     source.albedo = findGrid(cache, "albedo", entry.albedoGrid);
     checkAffine(source.path, source.albedo);
     checkAlbedo(source.path, source.albedo);
   }
-  if (wantEmission && entry.emits) {
+  if (wishes.emission && entry.emits) {
     const std::string& temperature = entry.emission.text("temperature");
     source.emission = temperature.empty()
                           ? findGrid(cache, "emission.grid", entry.emission.text("grid"))
@@ -182,7 +195,7 @@ VolumeSource readVolume(const SceneFile& scene, const VolumeEntry& entry, std::i
                                    source.emission.name(), source.emission.valueType()));
     checkAffine(source.path, source.emission);
   }
-  if (wantParticles)
+  if (wishes.particles)
     for (const Grid& grid : cache.pointGrids)
       for (const Vec3d& p : volume::gridToPoints(grid).positions)
         source.particles.push_back(transformPoint(source.worldFromFile, p));

@@ -31,6 +31,7 @@ struct VolumeSource {
   volume::Grid density;
   volume::Grid albedo;           ///< empty handle = the scene's constant
   volume::Grid emission;         ///< of values or temperatures; empty handle = none
+  volume::Grid velocity;         ///< as the file has it; empty handle = none
   Mat4d worldFromFile{1.0};      ///< transform and origin of the scene file
   Vec3d indexShift{0.0};         ///< half a voxel where cell_centered
   std::vector<Vec3d> particles;  ///< world space, where wanted
@@ -43,11 +44,16 @@ struct VolumeSource {
   Box3d bounds() const;
 };
 
-/// @param wantParticles  also hand out the positions of the file's points
-/// @param wantEmission   also hand out the grid that the entry's `emission` names
+/// What to hand out beside the density.
+struct SourceWishes {
+  bool particles = false;  ///< positions of the file's points
+  bool emission = false;   ///< the grid that the entry's `emission` names
+  bool velocity = false;   ///< the grid, or the points' attribute, that `velocity` names
+};
+
 /// @throws InputMissingError; InputError for a missing grid (listing what is there), a frustum
 ///         transform, an albedo outside [0, 1]; ConfigError for a singular transform
 VolumeSource readVolume(const SceneFile& scene, const VolumeEntry& entry, std::int64_t frame,
-                        bool wantParticles, bool wantEmission);
+                        const SourceWishes& wishes);
 
 }  // namespace photosphere::scene

@@ -38,7 +38,8 @@ double cellVolume(const Mat4d& m) {
 
 }  // namespace
 
-Emission::Emission(const std::vector<const VolumeEmission*>& volumes) {
+Emission::Emission(const std::vector<const VolumeEmission*>& volumes, double reach)
+    : m_reach(reach) {
   for (const VolumeEmission* v : volumes) {
     m_placed.push_back({&v->field, volume::NodeFromLocal(v->localFromNode), v->localFromNode});
     m_region.box.grow(volume::supportBounds(v->field, v->localFromNode));
@@ -63,6 +64,7 @@ Emission::Emission(const std::vector<const VolumeEmission*>& volumes) {
                                Vec3i(x, y, z) * Field::kEdge, m_birthPower});
         }
   }
+  m_region.box = volume::widened(m_region.box, reach);
 }
 
 void Emission::markCells(const volume::MajorantGrid& lattice) {
@@ -72,6 +74,7 @@ void Emission::markCells(const volume::MajorantGrid& lattice) {
       lattice.forEachOverlapped(v.localFromNode, lowest, edge,
                                 [&](std::size_t cell) { m_cells[cell] = 1; });
     });
+  lattice.widen(m_cells, m_reach);
 }
 
 Emission::Birth Emission::birth(double u, const Vec3f& offset) const {
@@ -100,6 +103,7 @@ Emission::Birth Emission::birth(double u, const Vec3f& offset) const {
     return !(own > 0.0f) || left >= 0.0f;
   });
   Birth birth;
+  birth.volume = source.volume;
   const Vec3f within(hat(node.x, offset.x), hat(node.y, offset.y), hat(node.z, offset.z));
   birth.origin =
       Vec3f(transformPoint(placed.localFromNode, Vec3d(source.lowest + node) + Vec3d(within)));

@@ -10,7 +10,8 @@ namespace photosphere::transport {
 
 namespace {
 
-void hashField(Hasher& hasher, const volume::BrickField<float>& field, const Mat4d& placement) {
+template <class T>
+void hashField(Hasher& hasher, const volume::BrickField<T>& field, const Mat4d& placement) {
   hasher.numbers(&placement[0][0], 16);
   const Vec3i& bricks = field.bricks();
   hasher.numbers(&bricks.x, 3);
@@ -21,7 +22,9 @@ void hashField(Hasher& hasher, const volume::BrickField<float>& field, const Mat
         if (brick < 0) continue;
         const Vec3i at(x, y, z);
         hasher.numbers(&at.x, 3);
-        hasher.numbers(field.nodes(brick), volume::BrickField<float>::kBrickSize);
+        constexpr std::size_t kNumbers =
+            volume::BrickField<T>::kBrickSize * sizeof(T) / sizeof(float);
+        hasher.numbers(reinterpret_cast<const float*>(field.nodes(brick)), kNumbers);
       }
 }
 
@@ -46,15 +49,25 @@ Medium::Placed Medium::place(const volume::BrickField<float>& field, const Mat4d
   return {&field, volume::NodeFromLocal(localFromNode), static_cast<float>(scale), phaseIndex};
 }
 
-Medium::Medium(std::vector<MediumVolume> volumes) : m_volumes(std::move(volumes)) {
+Medium::Medium(std::vector<MediumVolume> volumes, const Shutter& shutter)
+    : m_volumes(std::move(volumes)), m_shutter(shutter) {
   std::vector<volume::MajorantSource> sources;
   double edge = std::numeric_limits<double>::infinity();
+  double glowReach = 0.0;
   Hasher hasher;
   std::vector<const VolumeEmission*> emitting;
   for (const MediumVolume& v : m_volumes) {
-    sources.push_back({&v.density, v.localFromNode, v.densityScale});
+    const double reach = v.motion.velocity.empty() ? 0.0 : v.motion.fastest * shutter.longest();
+    m_displacement = std::max(m_displacement, reach);
+    m_motions.push_back(
+        {reach > 0 ? &v.motion.velocity : nullptr, volume::NodeFromLocal(v.motion.localFromNode)});
+    sources.push_back({&v.density, v.localFromNode, v.densityScale, reach});
     if (!v.density.empty()) edge = std::min(edge, volume::finestSpacing(v.localFromNode));
-    if (!v.emission.field.empty()) emitting.push_back(&v.emission);
+    if (!v.emission.field.empty()) {
+      m_emitting.push_back(m_placed.size());
+      emitting.push_back(&v.emission);
+      glowReach = std::max(glowReach, reach);
+    }
     int phaseIndex = 0;
     while (phaseIndex < static_cast<int>(m_phases.size()) &&
            !(m_phases[static_cast<std::size_t>(phaseIndex)] == v.phase))
@@ -70,22 +83,18 @@ Medium::Medium(std::vector<MediumVolume> volumes) : m_volumes(std::move(volumes)
                                               : albedo.fields.size() == 1);
     m_maximumAlbedo = std::max(m_maximumAlbedo, largestAlbedo(v));
     m_albedo.push_back(std::move(albedo));
-
-    hasher.number(v.densityScale);
-    hasher.numbers(&v.albedo.x, 3);
-    hashPhase(hasher, v.phase);
-    hashField(hasher, v.density, v.localFromNode);
-    for (const auto& field : v.albedoFields)
-      hashField(hasher, field, v.localFromAlbedoNode);
+    hashVolume(hasher, v);
   }
   if (m_phases.size() > static_cast<std::size_t>(kMaxPhases))
     throw ConfigError(
         fmt::format("the volumes mix {} different phase functions; at most {} are served",
                     m_phases.size(), kMaxPhases));
-  m_uniformAlbedo = m_volumes.size() == 1 && m_albedo.front().fields.empty();
+  m_moving = m_displacement > 0;
+  findColours();
+  m_uniformAlbedo = m_volumes.size() == 1 && m_albedo.front().fields.empty() && !m_coloured;
   if (m_phases.empty()) m_phases.emplace_back();
   if (!emitting.empty()) {
-    m_emission = std::make_unique<Emission>(emitting);
+    m_emission = std::make_unique<Emission>(emitting, glowReach);
     m_emission->hash(hasher);
   }
   const volume::WalkedRegion glow = m_emission ? m_emission->region() : volume::WalkedRegion{};
@@ -96,6 +105,68 @@ Medium::Medium(std::vector<MediumVolume> volumes) : m_volumes(std::move(volumes)
   m_hash = hasher.hex();
 }
 
+Medium Medium::held() && {
+  for (MediumVolume& v : m_volumes)
+    v.motion = {};
+  return Medium(std::move(m_volumes));
+}
+
+// What rests and is grey hashes as it did when there was nothing else.
+void Medium::hashVolume(Hasher& hasher, const MediumVolume& v) const {
+  hasher.number(v.densityScale);
+  if (v.tint != Rgb(1.0f)) hasher.numbers(&v.tint.x, 3);
+  hasher.numbers(&v.albedo.x, 3);
+  hashPhase(hasher, v.phase);
+  hashField(hasher, v.density, v.localFromNode);
+  for (const auto& field : v.albedoFields)
+    hashField(hasher, field, v.localFromAlbedoNode);
+  if (!m_motions.back().velocity) return;
+  hasher.number(m_shutter.open);
+  hasher.number(m_shutter.close);
+  hashField(hasher, v.motion.velocity, v.motion.localFromNode);
+}
+
+void Medium::findColours() {
+  const MediumVolume* first = nullptr;
+  bool shared = true;
+  for (const MediumVolume& v : m_volumes) {
+    if (v.density.empty() || !(v.densityScale > 0)) continue;
+    if (!first) first = &v;
+    shared = shared && v.tint == first->tint;
+    m_coloured = m_coloured || !photosphere::transport::isGrey(v.tint);
+  }
+  if (shared) m_tint = first ? first->tint : Rgb(1.0f);
+  m_grey = m_grey && !m_coloured;
+}
+
+float Medium::extinction(const Vec3f& p, Moment when) const {
+  float sum = 0.0f;
+  for (std::size_t i = 0; i < m_placed.size(); ++i)
+    sum +=
+        m_placed[i].scale * m_placed[i].field->sample(m_placed[i].nodeFromLocal(rest(i, p, when)));
+  return sum;
+}
+
+template <class When>
+Rgb Medium::channelSum(const Vec3f& p, When when) const {
+  Rgb sum(0.0f);
+  for (std::size_t i = 0; i < m_placed.size(); ++i)
+    sum += m_volumes[i].tint *
+           (m_placed[i].scale *
+            m_placed[i].field->sample(m_placed[i].nodeFromLocal(rest(i, p, when))));
+  return sum;
+}
+
+template Rgb Medium::channelSum(const Vec3f&, Still) const;
+template Rgb Medium::channelSum(const Vec3f&, Moment) const;
+
+Rgb Medium::emitted(const Vec3f& p, Moment when) const {
+  Rgb sum(0.0f);
+  for (std::size_t i = 0; i < m_emitting.size(); ++i)
+    sum += m_emission->part(i, rest(m_emitting[i], p, when));
+  return sum;
+}
+
 Rgb Medium::Albedo::at(const Vec3f& p) const {
   if (fields.empty()) return constant;
   Rgb value(fields[0].field->sample(fields[0].nodeFromLocal(p)));
@@ -104,23 +175,35 @@ Rgb Medium::Albedo::at(const Vec3f& p) const {
   return glm::clamp(value, 0.0f, 1.0f);
 }
 
-void Medium::coefficients(const Vec3f& p, Coefficients& out) const {
+template <class When>
+void Medium::gather(const Vec3f& p, Coefficients& out, When when) const {
   out.extinction = 0.0f;
   for (std::size_t i = 0; i < m_phases.size(); ++i)
     out.scattering[i] = Rgb(0.0f);
   for (std::size_t i = 0; i < m_placed.size(); ++i) {
     const Placed& v = m_placed[i];
-    const float sigma = v.scale * v.field->sample(v.nodeFromLocal(p));
+    const Vec3f at = rest(i, p, when);
+    const float sigma = v.scale * v.field->sample(v.nodeFromLocal(at));
     if (!(sigma > 0.0f)) continue;
     out.extinction += sigma;
-    out.scattering[static_cast<std::size_t>(v.phaseIndex)] += sigma * m_albedo[i].at(p);
+    const Rgb albedo = m_coloured ? m_volumes[i].tint * m_albedo[i].at(at) : m_albedo[i].at(at);
+    out.scattering[static_cast<std::size_t>(v.phaseIndex)] += sigma * albedo;
   }
+}
+
+void Medium::coefficients(const Vec3f& p, Coefficients& out, Still when) const {
+  gather(p, out, when);
+}
+
+void Medium::coefficients(const Vec3f& p, Coefficients& out, Moment when) const {
+  gather(p, out, when);
 }
 
 std::uint64_t Medium::memoryBytes() const {
   std::uint64_t bytes = m_majorants.memoryBytes() + (m_emission ? m_emission->memoryBytes() : 0);
   for (const MediumVolume& v : m_volumes) {
     bytes += v.density.memoryBytes();
+    bytes += v.motion.velocity.memoryBytes();
     for (const auto& field : v.albedoFields)
       bytes += field.memoryBytes();
   }

@@ -110,6 +110,27 @@ class Batch {
   std::vector<Flight> m_flights;
 };
 
+// When a photon flies: evenly spread over the shutter, along a sequence of its own (the golden
+// ratio's) beside the births'.
+class FlightTimes {
+ public:
+  FlightTimes(const Shutter& shutter, RandomKey key) : m_shutter(shutter) {
+    Rng rng(key, RandomStream::photon, ~1ull);
+    const std::uint64_t high = rng.bits();
+    m_shift = high << 32 | rng.bits();
+  }
+  void of(std::uint64_t, Still&) const {}
+  void of(std::uint64_t photon, Moment& when) const {
+    const std::uint64_t bits = photon * 0x9e3779b97f4a7c15ull + m_shift;
+    const double u = static_cast<double>(bits >> 11) * 0x1p-53;
+    when.seconds = static_cast<float>(m_shutter.open + u * (m_shutter.close - m_shutter.open));
+  }
+
+ private:
+  Shutter m_shutter;
+  std::uint64_t m_shift;
+};
+
 // Births of a frame's photons.
 class Births {
  public:
@@ -122,12 +143,13 @@ class Births {
   bool dark() const { return m_choice.dark(); }
 
   // The first flight of a photon, clipped to the medium's bounds; of length 0 where it misses them.
-  Flight operator()(std::uint64_t photon, Rng& rng) const {
+  template <class When>
+  Flight operator()(std::uint64_t photon, Rng& rng, When when) const {
     const std::size_t source = m_choice.choose(m_sequence(photon, 0));
     Flight flight;
     flight.photon = photon;
     if (source == m_lights.size())
-      bornInSmoke(photon, rng, flight);
+      bornInSmoke(photon, rng, flight, when);
     else
       sentByLamp(source, photon, flight);
     flight.power /= static_cast<float>(m_choice.probability(source));
@@ -135,13 +157,14 @@ class Births {
   }
 
  private:
-  void bornInSmoke(std::uint64_t photon, Rng& rng, Flight& flight) const {
+  template <class When>
+  void bornInSmoke(std::uint64_t photon, Rng& rng, Flight& flight, When when) const {
     const Vec2f u = rng.uniform2();
     const Emission::Birth birth =
         m_medium.emission()->birth(m_sequence.fine(photon, 1), Vec3f(u, rng.uniform()));
     flight.light = kEmittedBySmoke;
     flight.power = birth.power;
-    flight.origin = birth.origin;
+    flight.origin = m_medium.moved(birth.volume, birth.origin, when);
     flight.direction = sampleSphere(Vec2f(m_sequence(photon, 2), m_sequence(photon, 3)));
     flight.length = exitDistance(m_medium, flight.origin, flight.direction);
   }
@@ -167,11 +190,12 @@ class Births {
 };
 
 // Follows one photon from its entry into the bounds to its end.
+template <class When>
 void follow(const Medium& medium, Flight flight, Rng& rng, Batch& batch, TraceStatistics& stats,
-            TrackingCounters& counters) {
+            TrackingCounters& counters, When when) {
   while (true) {
-    const Collision hit =
-        sampleCollision(medium, flight.origin, flight.direction, flight.length, rng, counters);
+    const Collision hit = sampleCollision(medium, flight.origin, flight.direction, flight.length,
+                                          rng, counters, when);
     if (hit.happened()) flight.length = hit.distance;
     flight.extinctionAtEnd = hit.extinction;
     batch.add(flight);
@@ -182,15 +206,15 @@ void follow(const Medium& medium, Flight flight, Rng& rng, Batch& batch, TraceSt
     }
     const Vec3d before(flight.power);
     const Vec3f point = flight.origin + flight.direction * hit.distance;
-    ScatterEvent event = scatter(medium, point, flight.direction, rng);
+    const ScatterEvent event = scatter(medium, point, flight.direction, flight.power, rng, when);
     if (!event.survived) {
       stats.absorbed += before;
       return;
     }
     flight.power *= event.weight;
     stats.absorbed += before - Vec3d(flight.power);
-    ++stats.scatterings;
-    ++flight.scatterings;
+    stats.scatterings += event.scattered ? 1 : 0;
+    flight.scatterings += event.scattered ? 1 : 0;
     ++flight.ordinal;
     if (flight.scatterings > kLongPath) {
       const Vec3d whole(flight.power);
@@ -219,12 +243,42 @@ double sharedPower(const Medium& medium, const LightList& lights) {
   return medium.bounds().empty() ? 0.0 : SourceChoice(medium, lights).total();
 }
 
+namespace {
+
+// The photons of one chunk: [begin, end).
+template <class When>
+void traceChunk(const Medium& medium, const Births& births, const FlightTimes& times, RandomKey key,
+                std::uint64_t begin, std::uint64_t end, FlightSink& sink, TraceStatistics& stats) {
+  TrackingCounters counters;
+  Batch batch(sink);
+  for (std::uint64_t photon = begin; photon < end; ++photon) {
+    Rng rng(key, RandomStream::photon, photon);
+    When when;
+    times.of(photon, when);
+    const Flight flight = births(photon, rng, when);
+    const bool born = flight.light == kEmittedBySmoke;
+    ++stats.photons;
+    stats.born += born ? 1 : 0;
+    stats.emitted += Vec3d(flight.power);
+    // What is born at the very edge still leaves from inside.
+    if (flight.length > 0.0f || born)
+      follow(medium, flight, rng, batch, stats, counters, when);
+    else
+      stats.missed += Vec3d(flight.power);
+  }
+  stats.majorantViolations += counters.majorantViolations;
+}
+
+}  // namespace
+
 TraceStatistics tracePhotons(const Medium& medium, const LightList& lights,
                              const TraceOptions& options, FlightSink& sink) {
   TraceStatistics total;
   if (medium.bounds().empty()) return total;
   const Births births(medium, lights, options.key);
   if (births.dark()) return total;
+  const FlightTimes times(medium.shutter(), options.key);
+  const auto trace = medium.isMoving() ? traceChunk<Moment> : traceChunk<Still>;
   const std::uint64_t first = std::min(options.firstPhoton, options.photons);
   const std::uint64_t count = std::min(options.photonCount, options.photons - first);
   const std::uint64_t chunks = (count + kPhotonsPerChunk - 1) / kPhotonsPerChunk;
@@ -233,25 +287,9 @@ TraceStatistics tracePhotons(const Medium& medium, const LightList& lights,
 
   parallelFor(chunks, 1, [&](std::size_t beginChunk, std::size_t endChunk) {
     for (std::size_t chunk = beginChunk; chunk < endChunk; ++chunk) {
-      TraceStatistics& stats = parts[chunk];
-      TrackingCounters counters;
-      Batch batch(sink);
       const std::uint64_t begin = first + chunk * kPhotonsPerChunk;
       const std::uint64_t end = std::min(begin + kPhotonsPerChunk, first + count);
-      for (std::uint64_t photon = begin; photon < end; ++photon) {
-        Rng rng(options.key, RandomStream::photon, photon);
-        const Flight flight = births(photon, rng);
-        const bool born = flight.light == kEmittedBySmoke;
-        ++stats.photons;
-        stats.born += born ? 1 : 0;
-        stats.emitted += Vec3d(flight.power);
-        // What is born at the very edge still leaves from inside.
-        if (flight.length > 0.0f || born)
-          follow(medium, flight, rng, batch, stats, counters);
-        else
-          stats.missed += Vec3d(flight.power);
-      }
-      stats.majorantViolations += counters.majorantViolations;
+      trace(medium, births, times, options.key, begin, end, sink, parts[chunk]);
       progress.add(end - begin);
     }
   });

@@ -82,9 +82,10 @@ void markSupport(const Medium& medium, const Vec3d& origin, double edge, Marks& 
     if (field.empty() || !(v.densityScale > 0)) continue;
     const Mat4d& m = v.localFromNode;
     const Vec3d axes = glm::abs(Vec3d(m[0])) + glm::abs(Vec3d(m[1])) + glm::abs(Vec3d(m[2]));
+    const double reach = v.motion.fastest * medium.shutter().longest() / edge;
     volume::forEachCell(field, [&](const Vec3i& cell, int size, float) {
       const Vec3d center = (transformPoint(m, Vec3d(cell) + 0.5 * size) - origin) / edge;
-      const Vec3d half = axes * (0.5 * size / edge) * (1 - 1e-6);
+      const Vec3d half = axes * (0.5 * size / edge) * (1 - 1e-6) + reach;
       const Vec3i lo = Vec3i(glm::floor(center - half)), hi = Vec3i(glm::floor(center + half));
       for (int z = lo.z; z <= hi.z; ++z)
         for (int y = lo.y; y <= hi.y; ++y)

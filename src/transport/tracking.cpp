@@ -1,5 +1,7 @@
 #include "photosphere/transport/tracking.h"
 
+#include <type_traits>
+
 namespace photosphere::transport {
 
 Segment clipToMedium(const Medium& medium, const Vec3d& origin, const Vec3f& direction,
@@ -15,10 +17,12 @@ Segment clipToMedium(const Medium& medium, const Vec3d& origin, const Vec3f& dir
   return segment;
 }
 
-float marchOpticalDepth(const Medium& medium, const Vec3f& o, const Vec3f& d, float length,
-                        float step) {
-  const Medium::AlongRay extinction(medium, o, d);
-  double depth = 0.0;
+template <class Light, class When>
+Light marchOpticalDepth(const Medium& medium, const Vec3f& o, const Vec3f& d, float length,
+                        float step, When when) {
+  using Sum = std::conditional_t<std::is_same_v<Light, float>, double, Vec3d>;
+  const auto extinction = medium.alongRay(o, d, when);
+  Sum depth(0.0);
   for (volume::MajorantGrid::Walk walk(medium.majorants(), o, d, 0.0f, length); !walk.done();
        walk.advance()) {
     if (!(walk.majorant() > 0.0f)) continue;
@@ -27,12 +31,20 @@ float marchOpticalDepth(const Medium& medium, const Vec3f& o, const Vec3f& d, fl
     if (!(span > 0.0f)) continue;
     const int n = glm::max(1, static_cast<int>(std::ceil(span / step)));
     const float h = span / static_cast<float>(n);
-    float sum = 0.0f;
-    for (int i = 0; i < n; ++i)
-      sum += extinction(begin + (static_cast<float>(i) + 0.5f) * h);
-    depth += static_cast<double>(sum * h);
+    Light sum(0.0f);
+    for (int i = 0; i < n; ++i) {
+      const float t = begin + (static_cast<float>(i) + 0.5f) * h;
+      sum +=
+          extinctionFor(static_cast<const Light*>(nullptr), medium, o + d * t, extinction(t), when);
+    }
+    depth += Sum(sum * h);
   }
-  return static_cast<float>(depth);
+  return Light(depth);
 }
+
+template float marchOpticalDepth(const Medium&, const Vec3f&, const Vec3f&, float, float, Still);
+template float marchOpticalDepth(const Medium&, const Vec3f&, const Vec3f&, float, float, Moment);
+template Rgb marchOpticalDepth(const Medium&, const Vec3f&, const Vec3f&, float, float, Still);
+template Rgb marchOpticalDepth(const Medium&, const Vec3f&, const Vec3f&, float, float, Moment);
 
 }  // namespace photosphere::transport

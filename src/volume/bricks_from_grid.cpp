@@ -22,7 +22,7 @@ struct CoordLess {
 };
 
 template <class ValueT>
-double component(const ValueT& value, int c) {
+double componentOf(const ValueT& value, int c) {
   if constexpr (openvdb::VecTraits<ValueT>::IsVec)
     return static_cast<double>(value[c]);
   else
@@ -33,7 +33,7 @@ double component(const ValueT& value, int c) {
 template <class GridT>
 void checkValues(const GridT& grid, int c, const std::string& path, bool allowNegative) {
   for (auto it = grid.cbeginValueOn(); it; ++it) {
-    const double v = component(it.getValue(), c);
+    const double v = componentOf(it.getValue(), c);
     if (std::isfinite(v) && (allowNegative || v >= 0) && std::abs(v) <= 3e38) continue;
     const openvdb::Coord at = it.getCoord();
     throw InputError(path, fmt::format("grid '{}' holds {} at voxel ({}, {}, {}); clean the cache "
@@ -52,10 +52,10 @@ void touch(std::set<Vec3i, CoordLess>& bricks, const openvdb::CoordBBox& box, co
         bricks.insert({x, y, z});
 }
 
-template <class GridT>
-Field build(const GridT& grid, int c, const std::string& path, bool allowNegative,
-            std::uint64_t budgetBytes) {
-  checkValues(grid, c, path, allowNegative);
+// The nodes of a grid as values of type T; read(value) makes one of an active voxel.
+template <class T, class GridT, class Read>
+BrickField<T> build(const GridT& grid, const std::string& path, std::uint64_t budgetBytes,
+                    const Read& read) {
   const openvdb::CoordBBox active = grid.evalActiveVoxelBoundingBox();
   if (active.empty() || grid.activeVoxelCount() == 0) return {};
   const Vec3i lo(active.min().x(), active.min().y(), active.min().z());
@@ -92,7 +92,7 @@ Field build(const GridT& grid, int c, const std::string& path, bool allowNegativ
     if (b.x >= 0 && b.y >= 0 && b.z >= 0 && b.x < nx && b.y < ny && b.z < nz)
       candidates.push_back(b);
 
-  auto fetch = [&](const Vec3i& b, float* nodes) {
+  auto fetch = [&](const Vec3i& b, T* nodes) {
     const auto accessor = grid.getConstUnsafeAccessor();
     const openvdb::Coord first(origin.x + b.x * 8, origin.y + b.y * 8, origin.z + b.z * 8);
     typename GridT::ValueType value;
@@ -100,11 +100,12 @@ Field build(const GridT& grid, int c, const std::string& path, bool allowNegativ
       for (int y = 0; y < Field::kNodes; ++y)
         for (int x = 0; x < Field::kNodes; ++x) {
           const bool on = accessor.probeValue(first.offsetBy(x, y, z), value);
-          *nodes++ = on ? static_cast<float>(component(value, c)) : 0.0f;
+          *nodes++ = on ? read(value) : T(0.0f);
         }
   };
-  return Field(origin, Vec3i(static_cast<int>(nx), static_cast<int>(ny), static_cast<int>(nz)),
-               candidates, fetch);
+  return BrickField<T>(origin,
+                       Vec3i(static_cast<int>(nx), static_cast<int>(ny), static_cast<int>(nz)),
+                       candidates, fetch);
 }
 
 using Supported = openvdb::TypeList<openvdb::BoolGrid, openvdb::FloatGrid, openvdb::DoubleGrid,
@@ -117,13 +118,33 @@ Field bricksFromGrid(const Grid& grid, int component, const std::string& path, b
                      std::uint64_t budgetBytes) {
   Field field;
   const bool known = grid.base()->apply<Supported>([&](const auto& typed) {
-    field = build(typed, component, path, allowNegative, budgetBytes);
+    checkValues(typed, component, path, allowNegative);
+    field = build<float>(typed, path, budgetBytes, [&](const auto& value) {
+      return static_cast<float>(componentOf(value, component));
+    });
   });
   if (!known)
     throw InputError(path,
                      fmt::format("grid '{}' is of type {}, which cannot be a coefficient; use a "
                                  "float, half, double, int, bool or vec3 grid",
                                  grid.name(), grid.valueType()));
+  return field;
+}
+
+BrickField<Vec4f> vectorBricksFromGrid(const Grid& grid, const std::string& path,
+                                       std::uint64_t budgetBytes) {
+  BrickField<Vec4f> field;
+  const bool known =
+      grid.base()->apply<openvdb::TypeList<openvdb::Vec3SGrid>>([&](const auto& typed) {
+        for (int c = 0; c < 3; ++c)
+          checkValues(typed, c, path, true);
+        field = build<Vec4f>(typed, path, budgetBytes, [](const openvdb::Vec3f& v) {
+          return Vec4f(v.x(), v.y(), v.z(), 0.0f);
+        });
+      });
+  if (!known)
+    throw InputError(
+        path, fmt::format("grid '{}' is of type {}, not vec3s", grid.name(), grid.valueType()));
   return field;
 }
 

@@ -11,7 +11,7 @@ MajorantGrid::MajorantGrid(std::span<const MajorantSource> sources, const Walked
   }
   for (const MajorantSource& source : sources) {
     if (source.field->empty() || !(source.scale > 0)) continue;
-    m_bounds.grow(supportBounds(*source.field, source.localFromNode));
+    m_bounds.grow(widened(supportBounds(*source.field, source.localFromNode), source.reach));
     spacing = std::min(spacing, finestSpacing(source.localFromNode));
   }
   if (m_bounds.empty()) return;
@@ -42,6 +42,7 @@ void MajorantGrid::splat(const MajorantSource& source) {
     forEachOverlapped(source.localFromNode, cell, edge,
                       [&](std::size_t coarse) { own[coarse] = std::max(own[coarse], extinction); });
   });
+  widen(own, source.reach);
   for (std::size_t i = 0; i < own.size(); ++i)
     m_values[i] += own[i];
 }

@@ -53,8 +53,12 @@ void summarizeRadii(const std::vector<Blob>& blobs, RasterizeResult& result) {
 
 }  // namespace
 
-std::vector<Blob> collectBlobs(const ParticleSet& particles, const RasterizeOptions& options,
-                               RasterizeResult& result) {
+namespace {
+
+// Calls visit(i, radius, mass) for every particle.
+template <class Visit>
+void forEachParticle(const ParticleSet& particles, const RasterizeOptions& options,
+                     RasterizeResult& result, const Visit& visit) {
   const Attribute* pscale = scalarColumn(particles, "pscale");
   const Attribute* mass = scalarColumn(particles, "mass");
   const Attribute* density = scalarColumn(particles, "density");
@@ -66,25 +70,41 @@ std::vector<Blob> collectBlobs(const ParticleSet& particles, const RasterizeOpti
     result.spacing = medianSpacing(particles);
     shared = radiusFromSpacing(particles, result.spacing);
   }
-  std::vector<Blob> blobs;
-  blobs.reserve(particles.size());
   for (std::size_t i = 0; i < particles.size(); ++i) {
-    const Vec3d& p = particles.positions[i];
     const double radius = ownRadii ? pscale->number(i) : shared;
     // The mass of a density is that of the particle's own ball, whatever radius it is spread over.
     const double ball = sphereVolume(anyRadii ? pscale->number(i) : radius);
-    const double m = mass ? mass->number(i) : density ? density->number(i) * ball : 1.0;
+    visit(i, radius, mass ? mass->number(i) : density ? density->number(i) * ball : 1.0);
+  }
+}
+
+}  // namespace
+
+std::vector<Blob> collectBlobs(const ParticleSet& particles, const RasterizeOptions& options,
+                               RasterizeResult& result) {
+  std::vector<Blob> blobs;
+  blobs.reserve(particles.size());
+  forEachParticle(particles, options, result, [&](std::size_t i, double radius, double mass) {
+    const Vec3d& p = particles.positions[i];
     const bool valid = std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z) &&
-                       std::isfinite(radius) && radius >= 0 && std::isfinite(m) && m >= 0;
+                       std::isfinite(radius) && radius >= 0 && std::isfinite(mass) && mass >= 0;
     if (!valid) {
       ++result.skipped;
-      continue;
+      return;
     }
-    blobs.push_back({p, radius, m});
-    result.massParticles += m;
-  }
+    blobs.push_back({p, radius, mass});
+    result.massParticles += mass;
+  });
   summarizeRadii(blobs, result);
   return blobs;
+}
+
+std::vector<double> particleMasses(const ParticleSet& particles, const RasterizeOptions& options) {
+  std::vector<double> masses(particles.size());
+  RasterizeResult ignored;
+  forEachParticle(particles, options, ignored,
+                  [&](std::size_t i, double, double mass) { masses[i] = mass; });
+  return masses;
 }
 
 double chooseVoxelSize(const std::vector<Blob>& blobs, const RasterizeOptions& options,

@@ -19,6 +19,9 @@ struct Blob {
 std::vector<Blob> collectBlobs(const ParticleSet& particles, const RasterizeOptions& options,
                                RasterizeResult& result);
 
+/// Mass of every particle, valid or not, by the rule of `rasterize`.
+std::vector<double> particleMasses(const ParticleSet& particles, const RasterizeOptions& options);
+
 /// The voxel size that the options ask for, or the default rule (RasterizeOptions::voxelSize).
 double chooseVoxelSize(const std::vector<Blob>& blobs, const RasterizeOptions& options,
                        double radiusMedian);

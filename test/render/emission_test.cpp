@@ -41,7 +41,7 @@ TEST(Emission, EvenBoxMatchesTheClosedForm) {
     const double exact = 0.7 * (sigma > 0 ? -std::expm1(-sigma * length) / sigma : length);
     IntegratorCounters counters;
     Rng rng(RandomKey::fromSeed(1, 0), RandomStream::camera, 0);
-    const RayRadiance r = march->radiance(Vec3d(d) * -5.0, d, rng, counters);
+    const RayRadiance r = march->radiance(Vec3d(d) * -5.0, d, {}, rng, counters);
     EXPECT_NEAR(static_cast<double>(r.emission.x), exact, 2e-5 * exact) << sigma;
     EXPECT_NEAR(static_cast<double>(r.emission.y), exact * 2 / 7, 2e-5 * exact) << sigma;
     EXPECT_EQ(r.emission.z, 0.0f);

@@ -44,7 +44,7 @@ TEST_P(BoxSingle, MatchesTheClosedForm) {
       for (int i = 0; i < n; ++i) {
         Rng rng(RandomKey::fromSeed(1, 0), RandomStream::camera, static_cast<std::uint64_t>(i));
         sum += static_cast<double>(
-            march->radiance(Vec3d(-9, 0.1, z), Vec3f(1, 0, 0), rng, counters).single.x);
+            march->radiance(Vec3d(-9, 0.1, z), Vec3f(1, 0, 0), {}, rng, counters).single.x);
       }
       const double exact = boxSingle(sigma, 0.8, 1 - z, 2);
       const double bound = GetParam() == ShadowMode::track ? 0.04 : 0.004;
@@ -139,7 +139,7 @@ TEST(March, TransmittanceDoesNotDependOnTheStep) {
     const auto march = render::makeMarchIntegrator(medium, lights, shadows, nullptr, options);
     IntegratorCounters counters;
     Rng rng(RandomKey::fromSeed(1, 0), RandomStream::camera, 0);
-    const RayRadiance r = march->radiance(Vec3d(-9, 0.1, 0.2), Vec3f(1, 0, 0), rng, counters);
+    const RayRadiance r = march->radiance(Vec3d(-9, 0.1, 0.2), Vec3f(1, 0, 0), {}, rng, counters);
     EXPECT_NEAR(r.transmittance.x, std::exp(-3.0f), 1e-4f) << step;
     EXPECT_NEAR(r.depth / r.opacity, 8 + (1 - 4 * std::exp(-3.0)) / (1.5 * (1 - std::exp(-3.0))),
                 0.05);
@@ -160,7 +160,7 @@ TEST(March, LampNearTheRayMatchesTheClosedForm) {
     const auto march = render::makeMarchIntegrator(medium, lights, shadows, nullptr, {});
     IntegratorCounters counters;
     Rng rng(RandomKey::fromSeed(1, 0), RandomStream::camera, 0);
-    const RayRadiance r = march->radiance(Vec3d(-9, 0.1, 0.2), Vec3f(1, 0, 0), rng, counters);
+    const RayRadiance r = march->radiance(Vec3d(-9, 0.1, 0.2), Vec3f(1, 0, 0), {}, rng, counters);
     const double angle = std::atan((1 - 0.21) / height) + std::atan((1 + 0.21) / height);
     const double exact = sigma * albedo / (4 * kPi) * angle / height;
     EXPECT_NEAR(static_cast<double>(r.single.x), exact, 0.005 * exact) << height;

@@ -27,7 +27,7 @@ Estimate estimate(const render::Integrator& integrator, const Vec3d& origin, con
       render::IntegratorCounters counters;
       for (std::size_t i = 0; i < kChunk; ++i) {
         Rng rng(RandomKey::fromSeed(11, 0), RandomStream::camera, chunk * kChunk + i);
-        const double v = pick(integrator.radiance(origin, direction, rng, counters));
+        const double v = pick(integrator.radiance(origin, direction, {}, rng, counters));
         sums[chunk] += v;
         squares[chunk] += v * v;
       }

@@ -34,6 +34,8 @@ struct FrameOptions {
   RandomKey key;
   lights::LocalSpace space;  ///< camera rays are in world space
   Lens lens;                 ///< of a perspective camera
+  bool moving = false;       ///< something moves while the shutter is open
+  transport::Shutter shutter;
 };
 
 /// Layers of a frame over its crop, row by row from the top, RGB interleaved as Rgb.

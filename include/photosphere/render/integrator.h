@@ -49,8 +49,9 @@ class Integrator {
   virtual ~Integrator() = default;
   /// @param origin     local space [m], double
   /// @param direction  unit
-  virtual RayRadiance radiance(const Vec3d& origin, const Vec3f& direction, Rng& rng,
-                               IntegratorCounters& counters) const = 0;
+  /// @param when       acts where the smoke moves
+  virtual RayRadiance radiance(const Vec3d& origin, const Vec3f& direction, transport::Moment when,
+                               Rng& rng, IntegratorCounters& counters) const = 0;
 };
 
 /// How path tracing meets the light of uniform surroundings.

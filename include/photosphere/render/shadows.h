@@ -25,6 +25,8 @@ enum class ShadowMode {
 /// Shadows of every lamp of a frame. Reading is thread-safe.
 class Shadows {
  public:
+  /// Grids of smoke that moves are made for several times of the shutter and read between them;
+  /// those of volumes whose extinctions have different colours, for each channel.
   /// @param step         march step [m]
   /// @param budgetBytes  grids past it fall back to `march`, said in the log; 0 = no limit
   Shadows(const transport::Medium& medium, const transport::LightList& lights, ShadowMode mode,
@@ -32,9 +34,11 @@ class Shadows {
   ~Shadows();
 
   /// Transmittance from `p` to lamp `light` [0, 1].
+  /// @tparam Light  float, or Rgb where extinction differs from channel to channel
   /// @param direction, distance  as lights::Illumination gives them
-  float transmittance(std::size_t light, const Vec3f& p, const Vec3f& direction, float distance,
-                      Rng& rng, transport::TrackingCounters& counters) const;
+  template <class Light = float, class When = transport::Still>
+  Light transmittance(std::size_t light, const Vec3f& p, const Vec3f& direction, float distance,
+                      Rng& rng, transport::TrackingCounters& counters, When when = {}) const;
   std::uint64_t memoryBytes() const;
 
  private:
@@ -43,15 +47,33 @@ class Shadows {
     volume::BrickField<float> opticalDepth;
     Vec3f origin{0.0f};
     float inversePitch = 1.0f;
+    float at(const Vec3f& p) const { return opticalDepth.sample((p - origin) * inversePitch); }
   };
+  // Of one lamp: time by time, and channel by channel in each; one of the two is empty.
+  struct Tabulated {
+    std::vector<LightDepth> depths;
+    std::vector<Table> tables;
+  };
+
+  // Extinction that a grid sums up: of all channels together, or of one; at one time.
+  struct Layer {
+    int channel = -1;  // -1 = Medium::extinction
+    std::optional<transport::Moment> when;
+  };
+  std::vector<Layer> layers() const;
+  float marchedDepth(const transport::Segment& toLight, const Layer& layer) const;
+  Table uprightTable(const lights::Light& light, const transport::SupportLattice& lattice,
+                     const Layer& layer) const;
+  // Optical depth in one set of grids.
+  template <class Grids, class Light, class When>
+  Light depthIn(const Grids& grids, const Vec3f& p, const Light* kind, When when) const;
 
   const transport::Medium* m_medium;
   ShadowMode m_mode;
   float m_step;
-  std::vector<std::unique_ptr<LightDepth>> m_depths;  // of lamps that stand off
-  std::vector<std::optional<Table>> m_tables;         // of the others
-
-  Table uprightTable(const lights::Light& light, const transport::SupportLattice& lattice) const;
+  std::size_t m_channels = 1;  // grids of one time
+  std::size_t m_times = 1;
+  std::vector<Tabulated> m_tabulated;  // by lamp
 };
 
 }  // namespace photosphere::render

@@ -29,7 +29,8 @@ inline Vec4f emissionNode(const Rgb& j) {
 class Emission {
  public:
   /// @param volumes  those with a field alone; they must outlive this
-  explicit Emission(const std::vector<const VolumeEmission*>& volumes);
+  /// @param reach    farthest that any of them moves while the shutter is open [m]
+  explicit Emission(const std::vector<const VolumeEmission*>& volumes, double reach = 0.0);
 
   /// j [W m^-3 sr^-1]; zero where nothing emits.
   Rgb at(const Vec3f& p) const {
@@ -37,6 +38,11 @@ class Emission {
     for (const Placed& v : m_placed)
       sum += v.field->sample(v.nodeFromLocal(p));
     return Rgb(sum);
+  }
+  /// Of one of the volumes, counted from 0.
+  Rgb part(std::size_t volume, const Vec3f& p) const {
+    const Placed& v = m_placed[volume];
+    return Rgb(v.field->sample(v.nodeFromLocal(p)));
   }
   /// What emits, for the lattice that rays walk.
   const volume::WalkedRegion& region() const { return m_region; }
@@ -54,7 +60,8 @@ class Emission {
 
   struct Birth {
     Vec3f origin{0.0f};
-    Rgb power{0.0f};  ///< [W], for a photon that stands for all of `birthPower`
+    Rgb power{0.0f};         ///< [W], for a photon that stands for all of `birthPower`
+    std::size_t volume = 0;  ///< that it leaves, counted from 0
   };
   /// A point drawn in proportion to the largest channel of j, exactly as it is interpolated.
   /// @param u       chooses the node, in storage order: evenly spread values spread over space
@@ -82,6 +89,7 @@ class Emission {
   std::vector<Source> m_sources;
   std::vector<std::uint8_t> m_cells;
   volume::WalkedRegion m_region;
+  double m_reach = 0.0;
   Vec3d m_power{0.0};
   double m_birthPower = 0.0;
   bool m_grey = true;

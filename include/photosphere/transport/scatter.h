@@ -9,14 +9,69 @@ namespace photosphere::transport {
 /// Result of a collision.
 struct ScatterEvent {
   bool survived = false;
-  Rgb weight{1.0f};  ///< multiplies the power; no channel above 1 for one phase function
+  /// False: nothing was met and the flight goes on as it was, with another weight. Only where
+  /// extinction differs from channel to channel.
+  bool scattered = true;
+  Rgb weight{1.0f};  ///< multiplies the power; no channel above 1 for one phase function and grey
+                     ///< extinction. Where extinction is coloured, the sum of the channels' powers
+                     ///< stays what it was
   Vec3f direction{0.0f};
   int phase = 0;  ///< index into Medium::phases()
 };
 
+/// What becomes of light of some power where each channel has its own chances: at a collision drawn
+/// for the densest channel it passes, scatters or is absorbed. What happens is drawn for the sum of
+/// the channels' powers and each channel weighted by its own chance over that (the balance
+/// heuristic over channels, with all of the path so far; Miller, Georgiev and Jarosz 2019, Kutz et
+/// al. 2017), so the sum never changes and no channel ever passes it.
+/// @param passes  chance of each channel to meet nothing
+/// @param rate    what the scattering coefficients of `c` are divided by: with `passes`, no sum
+///                above 1 in any channel
+inline ScatterEvent scatterColoured(const Medium& medium, const Coefficients& c, const Rgb& passes,
+                                    const Rgb& rate, const Vec3f& wi, const Rgb& power, Rng& rng) {
+  ScatterEvent event;
+  const float sum = power.x + power.y + power.z;
+  if (!(sum > 0.0f)) return event;
+  const Rgb share = power / sum;
+  float u = rng.uniform();
+  const float pass = glm::dot(share, passes);
+  if (u < pass) {
+    event.survived = true;
+    event.scattered = false;
+    event.weight = passes / pass;
+    event.direction = wi;
+    return event;
+  }
+  u -= pass;
+  const auto& phases = medium.phases();
+  for (std::size_t i = 0; i < phases.size(); ++i) {
+    Rgb chance(0.0f);
+    for (int channel = 0; channel < 3; ++channel)
+      if (rate[channel] > 0.0f) chance[channel] = c.scattering[i][channel] / rate[channel];
+    const float own = glm::dot(share, chance);
+    if (u < own) {
+      event.survived = true;
+      event.phase = static_cast<int>(i);
+      event.weight = chance / own;
+      event.direction = phases[i].sample(wi, rng.uniform2());
+      return event;
+    }
+    u -= own;
+  }
+  return event;
+}
+
+/// Chance of each channel to meet nothing at a collision drawn at the rate of the densest.
+inline Rgb passingChance(const Coefficients& c, const Rgb& channels) {
+  return glm::max(Rgb(0.0f), Rgb(1.0f) - channels / c.extinction);
+}
+
 /// Russian roulette with the largest albedo of the channels, so that grey media keep equal weights
 /// and coloured ones bounded weights; then a phase function in proportion to its scattering.
-inline ScatterEvent scatter(const Medium& medium, const Vec3f& point, const Vec3f& wi, Rng& rng) {
+/// @param power  of the light that arrives, in any unit: acts where extinction is coloured
+template <class When = Still>
+inline ScatterEvent scatter(const Medium& medium, const Vec3f& point, const Vec3f& wi,
+                            const Rgb& power, Rng& rng, When when = {}) {
   ScatterEvent event;
   const auto& phases = medium.phases();
   if (const Rgb* uniform = medium.uniformAlbedo()) {
@@ -25,7 +80,13 @@ inline ScatterEvent scatter(const Medium& medium, const Vec3f& point, const Vec3
     event.weight = *uniform / q;
   } else {
     Coefficients c;
-    medium.coefficients(point, c);
+    medium.coefficients(point, c, when);
+    if (medium.isColoured()) {
+      if (!(c.extinction > 0.0f)) return event;
+      const Rgb channels = medium.channels(point, c.extinction, when);
+      return scatterColoured(medium, c, passingChance(c, channels), Rgb(c.extinction), wi, power,
+                             rng);
+    }
     const int count = static_cast<int>(phases.size());
     const Rgb scattering = c.totalScattering(count);
     const float q =

@@ -1,8 +1,10 @@
 #pragma once
 // Distances and transmittances through the medium, unbiased (delta and ratio tracking) and marched.
-// Rays are given in local space as float: their origins lie at or inside the medium's bounds.
+// Rays are given in local space as float: their origins lie at or inside the medium's bounds. Each
+// takes the time last: `Still`, or a `Moment` of a medium that moves.
 
 #include <cstdint>
+#include <type_traits>
 
 #include "photosphere/core/fast_math.h"
 #include "photosphere/core/rng.h"
@@ -48,10 +50,11 @@ struct Collision {
 /// Calls visit(distance, sigma_t, majorant) for the tentative collisions of a ray, drawn against
 /// the local majorants in order, until it returns false: the walk that delta and ratio tracking
 /// share.
-template <class Visit>
+template <class Visit, class When = Still>
 inline void forEachTentative(const Medium& medium, const Vec3f& o, const Vec3f& d, float length,
-                             Rng& rng, TrackingCounters& counters, const Visit& visit) {
-  const Medium::AlongRay extinction(medium, o, d);
+                             Rng& rng, TrackingCounters& counters, const Visit& visit,
+                             When when = {}) {
+  const auto extinction = medium.alongRay(o, d, when);
   float tau = -fastLog(rng.uniformPositive());
   for (volume::MajorantGrid::Walk walk(medium.majorants(), o, d, 0.0f, length); !walk.done();
        walk.advance()) {
@@ -74,76 +77,123 @@ inline void forEachTentative(const Medium& medium, const Vec3f& o, const Vec3f& 
   }
 }
 
+/// What is left of light along a ray: of all channels alike, or of each.
+inline float largestOf(float transmittance) {
+  return transmittance;
+}
+inline float largestOf(const Rgb& transmittance) {
+  return maxComponent(transmittance);
+}
+
+/// sigma_t as a transmittance takes it: one number, or one for each channel.
+template <class When>
+inline float extinctionFor(const float*, const Medium&, const Vec3f&, float sigma, When) {
+  return sigma;
+}
+template <class When>
+inline Rgb extinctionFor(const Rgb*, const Medium& medium, const Vec3f& p, float sigma, When when) {
+  return medium.channels(p, sigma, when);
+}
+
 /// The factor of one tentative collision in a ratio-tracked transmittance, with roulette once that
 /// is small: survival in proportion to what is left keeps it unbiased and ends dark rays.
+/// @tparam Light  float, or Rgb where the channels differ
 /// @return false when the ray has ended dark
-inline bool attenuate(float& transmittance, float sigma, float majorant, Rng& rng) {
-  transmittance *= glm::max(0.0f, 1.0f - sigma / majorant);
-  if (transmittance < 0.1f) {
-    if (!(rng.uniform() * 0.1f < transmittance)) {
-      transmittance = 0.0f;
+template <class Light>
+inline bool attenuate(Light& transmittance, const Light& sigma, float majorant, Rng& rng) {
+  transmittance *= glm::max(Light(0.0f), Light(1.0f) - sigma / majorant);
+  if (largestOf(transmittance) < 0.1f) {
+    const float left = largestOf(transmittance);
+    if (!(rng.uniform() * 0.1f < left)) {
+      transmittance = Light(0.0f);
       return false;
     }
-    transmittance = 0.1f;
+    if constexpr (std::is_same_v<Light, float>)
+      transmittance = 0.1f;
+    else
+      transmittance *= 0.1f / left;
   }
   return true;
 }
 
-/// The first real collision (Woodcock delta tracking over local majorants).
+/// The first real collision (Woodcock delta tracking over local majorants). Where channels differ,
+/// it is one of the densest: `scatter` then decides what it is for the light that arrives.
+template <class When = Still>
 inline Collision sampleCollision(const Medium& medium, const Vec3f& o, const Vec3f& d, float length,
-                                 Rng& rng, TrackingCounters& counters) {
+                                 Rng& rng, TrackingCounters& counters, When when = {}) {
   Collision hit;
-  forEachTentative(medium, o, d, length, rng, counters, [&](float t, float sigma, float majorant) {
-    const bool real = rng.uniform() * majorant < sigma;
-    if (real) hit = {t, sigma};
-    return !real;
-  });
+  forEachTentative(
+      medium, o, d, length, rng, counters,
+      [&](float t, float sigma, float majorant) {
+        const bool real = rng.uniform() * majorant < sigma;
+        if (real) hit = {t, sigma};
+        return !real;
+      },
+      when);
   return hit;
 }
 
 /// Unbiased transmittance along a ray (ratio tracking, Novak et al. 2014).
-inline float trackTransmittance(const Medium& medium, const Vec3f& o, const Vec3f& d, float length,
-                                Rng& rng, TrackingCounters& counters) {
-  float transmittance = 1.0f;
-  forEachTentative(medium, o, d, length, rng, counters, [&](float, float sigma, float majorant) {
-    return attenuate(transmittance, sigma, majorant, rng);
-  });
+/// @tparam Light  float, or Rgb where the channels differ
+template <class Light = float, class When = Still>
+inline Light trackTransmittance(const Medium& medium, const Vec3f& o, const Vec3f& d, float length,
+                                Rng& rng, TrackingCounters& counters, When when = {}) {
+  Light transmittance(1.0f);
+  forEachTentative(
+      medium, o, d, length, rng, counters,
+      [&](float t, float sigma, float majorant) {
+        const Light own =
+            extinctionFor(static_cast<const Light*>(nullptr), medium, o + d * t, sigma, when);
+        return attenuate(transmittance, own, majorant, rng);
+      },
+      when);
   return transmittance;
 }
 
 /// The first real collision and, from the same tentative ones, the transmittance of the whole ray:
 /// both unbiased, and correlated with each other.
+template <class Light, class When = Still>
 inline Collision sampleCollisionAndTransmittance(const Medium& medium, const Vec3f& o,
                                                  const Vec3f& d, float length, Rng& rng,
-                                                 TrackingCounters& counters, float& transmittance) {
+                                                 TrackingCounters& counters, Light& transmittance,
+                                                 When when = {}) {
   Collision first;
-  transmittance = 1.0f;
-  forEachTentative(medium, o, d, length, rng, counters, [&](float t, float sigma, float majorant) {
-    if (!first.happened() && rng.uniform() * majorant < sigma) first = {t, sigma};
-    // A ray that has ended dark walks on only until it has its collision.
-    return attenuate(transmittance, sigma, majorant, rng) || !first.happened();
-  });
+  transmittance = Light(1.0f);
+  forEachTentative(
+      medium, o, d, length, rng, counters,
+      [&](float t, float sigma, float majorant) {
+        if (!first.happened() && rng.uniform() * majorant < sigma) first = {t, sigma};
+        const Light own =
+            extinctionFor(static_cast<const Light*>(nullptr), medium, o + d * t, sigma, when);
+        // A ray that has ended dark walks on only until it has its collision.
+        return attenuate(transmittance, own, majorant, rng) || !first.happened();
+      },
+      when);
   return first;
 }
 
 /// Unbiased integral of the medium's emission along a ray [W m^-2 sr^-1], not attenuated: up to a
 /// real collision its mean is what arrives attenuated. One random point in every stretch of the
 /// lattice that can emit.
+template <class When = Still>
 inline Rgb sampleEmission(const Medium& medium, const Emission& emission, const Vec3f& o,
-                          const Vec3f& d, float length, Rng& rng) {
+                          const Vec3f& d, float length, Rng& rng, When when = {}) {
   Rgb sum(0.0f);
   for (volume::MajorantGrid::Walk walk(medium.majorants(), o, d, 0.0f, length); !walk.done();
        walk.advance()) {
     if (!emission.inCell(walk.cell())) continue;
     const float span = walk.end() - walk.begin();
-    if (span > 0.0f) sum += span * emission.at(o + d * (walk.begin() + rng.uniform() * span));
+    if (span > 0.0f)
+      sum += span * medium.emitted(o + d * (walk.begin() + rng.uniform() * span), when);
   }
   return sum;
 }
 
 /// Optical depth along a ray by the midpoint rule.
-/// @param step  [m]
-float marchOpticalDepth(const Medium& medium, const Vec3f& o, const Vec3f& d, float length,
-                        float step);
+/// @tparam Light  float, or Rgb where the channels differ
+/// @param step    [m]
+template <class Light = float, class When = Still>
+Light marchOpticalDepth(const Medium& medium, const Vec3f& o, const Vec3f& d, float length,
+                        float step, When when = {});
 
 }  // namespace photosphere::transport

@@ -188,4 +188,10 @@ void forEachCell(const BrickField<T>& field, const Visit& visit) {
 BrickField<float> bricksFromGrid(const Grid& grid, int component, const std::string& path,
                                  bool allowNegative, std::uint64_t budgetBytes);
 
+/// A vec3s grid as bricks of (x, y, z, 0). Inactive voxels count as zero.
+/// @throws InputError for another type of grid and for a NaN or infinite value, naming the first
+///         such voxel; MemoryError as bricksFromGrid
+BrickField<Vec4f> vectorBricksFromGrid(const Grid& grid, const std::string& path,
+                                       std::uint64_t budgetBytes);
+
 }  // namespace photosphere::volume

@@ -18,6 +18,7 @@ struct MajorantSource {
   const BrickField<float>* field = nullptr;
   Mat4d localFromNode{1.0};  ///< node position (from the field's origin) to local space [m]
   double scale = 1.0;        ///< extinction per unit of value [1/m]
+  double reach = 0.0;        ///< farthest that it moves while the shutter is open [m]
 };
 
 /// A region that rays must walk through although nothing in it absorbs or scatters: a flame.
@@ -25,6 +26,14 @@ struct WalkedRegion {
   Box3d box;                                                 ///< local space [m]; empty = none
   double spacing = std::numeric_limits<double>::infinity();  ///< of its voxels [m]
 };
+
+/// A box with a margin around it [m]; an empty one stays empty.
+inline Box3d widened(Box3d box, double margin) {
+  if (box.empty()) return box;
+  box.min -= margin;
+  box.max += margin;
+  return box;
+}
 
 /// Axis-aligned lattice of majorants of the summed trilinear extinction, local space [m].
 class MajorantGrid {
@@ -129,6 +138,11 @@ class MajorantGrid {
           visit(cellIndex({i, j, k}));
   }
 
+  /// Raises every cell to the largest value of the cells within a distance [m] of it.
+  /// @param cells  one value a cell
+  template <class T>
+  void widen(std::vector<T>& cells, double reach) const;
+
  private:
   std::size_t cellIndex(const Vec3i& c) const {
     return (static_cast<std::size_t>(c.z) * static_cast<std::size_t>(m_dims.y) +
@@ -144,6 +158,34 @@ class MajorantGrid {
   std::vector<float> m_values;
   float m_maximum = 0.0f;
 };
+
+template <class T>
+void MajorantGrid::widen(std::vector<T>& cells, double reach) const {
+  if (!(reach > 0)) return;
+  for (int axis = 0; axis < 3; ++axis) {
+    const int n = m_dims[axis];
+    const int r = static_cast<int>(
+        std::min<double>(n, std::ceil(reach / static_cast<double>(m_cellSize[axis]))));
+    const Vec3i others = axis == 0   ? Vec3i(1, m_dims.y, m_dims.z)
+                         : axis == 1 ? Vec3i(m_dims.x, 1, m_dims.z)
+                                     : Vec3i(m_dims.x, m_dims.y, 1);
+    std::vector<T> row(static_cast<std::size_t>(n));
+    for (int z = 0; z < others.z; ++z)
+      for (int y = 0; y < others.y; ++y)
+        for (int x = 0; x < others.x; ++x) {
+          Vec3i c(x, y, z);
+          const auto at = [&](int i) -> T& {
+            c[axis] = i;
+            return cells[cellIndex(c)];
+          };
+          for (int i = 0; i < n; ++i)
+            row[static_cast<std::size_t>(i)] = at(i);
+          for (int i = 0; i < n; ++i)
+            for (int j = std::max(0, i - r); j <= std::min(n - 1, i + r); ++j)
+              at(i) = std::max(at(i), row[static_cast<std::size_t>(j)]);
+        }
+  }
+}
 
 /// Local-space box of the cells of a field where interpolation can give anything but zero [m].
 template <class T>
