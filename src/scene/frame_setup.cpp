@@ -13,6 +13,7 @@
 #include "photosphere/core/registry.h"
 #include "photosphere/core/resources.h"
 #include "photosphere/phase/phase.h"
+#include "photosphere/scene/plan.h"
 #include "photosphere/volume/rasterize.h"
 #include "photosphere/volume/vdb_file.h"
 #include "photosphere/volume/velocity.h"
@@ -362,16 +363,21 @@ std::uint64_t predictedLightBytes(const FrameSetup& setup) {
   return bytes + transport::SupportLattice(medium, edge, margin).size() * values * bytesEach;
 }
 
+FrameMemory predictedMemory(const FrameSetup& setup, bool storedLight) {
+  FrameMemory memory;
+  memory.smoke = setup.medium->memoryBytes();
+  memory.light = storedLight ? predictedLightBytes(setup) : 0;
+  const Vec2i size = setup.camera->resolution();
+  memory.pixels = static_cast<std::uint64_t>(size.x) * static_cast<std::uint64_t>(size.y) *
+                  (6 * sizeof(Rgb) + 2 * sizeof(float)) *
+                  (setup.batches > 1 || (setup.photonMap && setup.photonMap->passes > 1) ? 3 : 1);
+  return memory;
+}
+
 void checkMemory(const FrameSetup& setup, bool storedLight) {
   if (setup.memoryBudget == 0) return;
-  const std::uint64_t smoke = setup.medium->memoryBytes();
-  const std::uint64_t light = storedLight ? predictedLightBytes(setup) : 0;
-  const Vec2i size = setup.camera->resolution();
-  const std::uint64_t frame =
-      static_cast<std::uint64_t>(size.x) * static_cast<std::uint64_t>(size.y) *
-      (6 * sizeof(Rgb) + 2 * sizeof(float)) *
-      (setup.batches > 1 || (setup.photonMap && setup.photonMap->passes > 1) ? 3 : 1);
-  if (smoke + light + frame <= setup.memoryBudget) return;
+  const FrameMemory memory = predictedMemory(setup, storedLight);
+  if (memory.total() <= setup.memoryBudget) return;
   const std::string_view less =
       setup.photonMap
           ? "Lower estimator.photons (with estimator.passes, as many photons in less memory)"
@@ -380,8 +386,8 @@ void checkMemory(const FrameSetup& setup, bool storedLight) {
   throw MemoryError(fmt::format(
       "this frame needs about {}: {} for the smoke, {} for stored light, {} for pixels; the budget "
       "is {}. {}, lower the resolution, or raise render.memory_limit (-1 = none)",
-      formatBytes(smoke + light + frame), formatBytes(smoke), formatBytes(light),
-      formatBytes(frame), formatBytes(setup.memoryBudget), less));
+      formatBytes(memory.total()), formatBytes(memory.smoke), formatBytes(memory.light),
+      formatBytes(memory.pixels), formatBytes(setup.memoryBudget), less));
 }
 
 Mat4d frameBox(const Box3d& box, const Vec3d& target, const Vec3d& up, double fovDegrees,
