@@ -80,7 +80,7 @@ Rgb FinalGather::arriving(Vec3f p, const Vec3f& d, const Rgb& power, Rng& rng,
     Coefficients c;
     m_medium.coefficients(p, c, when);
     if (!(c.extinction > 0.0f)) return radiance;
-    const estimators::Inscatter in = m_source.at(p, -d, c);
+    const estimators::Inscatter in = m_source.at(m_medium.carrierOf(p, when), -d, c);
     const Rgb lamps = m_direct.at<Light>(p, -d, c, nullptr, rng, counters, when);
     radiance += left * (lamps + in.single + in.multiple) / c.extinction;
     if constexpr (std::is_same_v<Light, float>) return radiance;

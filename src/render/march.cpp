@@ -163,7 +163,7 @@ class MarchIntegrator final : public Integrator {
     if (m_options.effects.singleScattering)
       result.single += weight * m_direct.at<Light>(p, wo, c, &step, rng, counters, when);
     if (m_source && !(m_gather && !m_source->carriesUnscattered())) {
-      const estimators::Inscatter in = m_source->at(p, wo, c);
+      const estimators::Inscatter in = m_source->at(m_medium.carrierOf(p, when), wo, c);
       result.single += weight * in.single;
       result.multiple += weight * in.multiple;
     }

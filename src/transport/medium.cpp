@@ -160,6 +160,21 @@ Rgb Medium::channelSum(const Vec3f& p, When when) const {
 template Rgb Medium::channelSum(const Vec3f&, Still) const;
 template Rgb Medium::channelSum(const Vec3f&, Moment) const;
 
+Vec3f Medium::carrierOf(const Vec3f& p, Moment when) const {
+  if (m_placed.size() == 1) return rest(0, p, when);
+  Vec3f sum(0.0f);
+  float weights = 0.0f;
+  for (std::size_t i = 0; i < m_placed.size(); ++i) {
+    const Vec3f at = rest(i, p, when);
+    const Placed& v = m_placed[i];
+    // Where there is no smoke, what is stored is not read: any place between theirs will do.
+    const float weight = v.scale * (v.field->sample(v.nodeFromLocal(at)) + 1e-6f);
+    sum += weight * at;
+    weights += weight;
+  }
+  return weights > 0.0f ? sum / weights : p;
+}
+
 Rgb Medium::emitted(const Vec3f& p, Moment when) const {
   Rgb sum(0.0f);
   for (std::size_t i = 0; i < m_emitting.size(); ++i)

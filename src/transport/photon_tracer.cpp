@@ -189,6 +189,32 @@ class Births {
   BirthSequence m_sequence;
 };
 
+// Hands a flight on as sinks take it: where the smoke rests.
+void handOn(const Medium&, const Flight& flight, Batch& batch, Still) {
+  batch.add(flight);
+}
+
+// Smoke that moves keeps its light with it (Medium::carrierOf): pieces of a flight are shifted to
+// where their smoke lies at the frame's own time. Short ones, as the shift varies along the way;
+// the last, to where it ends.
+void handOn(const Medium& medium, const Flight& flight, Batch& batch, Moment when) {
+  const float longest = 4.0f * static_cast<float>(medium.voxelEdge());
+  const int pieces =
+      static_cast<int>(std::clamp(std::ceil(flight.length / longest), 1.0f, 4096.0f));
+  Flight piece = flight;
+  piece.length = flight.length / static_cast<float>(pieces);
+  for (int i = 0; i < pieces; ++i) {
+    const bool last = i + 1 == pieces;
+    piece.origin = flight.origin + flight.direction * (static_cast<float>(i) * piece.length);
+    const Vec3f at =
+        piece.origin + flight.direction * (last && flight.collided() ? 1.0f : 0.5f) * piece.length;
+    piece.origin += medium.carrierOf(at, when) - at;
+    piece.extinctionAtEnd = last ? flight.extinctionAtEnd : 0.0f;
+    piece.ordinal = flight.ordinal << 12 | static_cast<std::uint32_t>(i);
+    batch.add(piece);
+  }
+}
+
 // Follows one photon from its entry into the bounds to its end.
 template <class When>
 void follow(const Medium& medium, Flight flight, Rng& rng, Batch& batch, TraceStatistics& stats,
@@ -198,7 +224,7 @@ void follow(const Medium& medium, Flight flight, Rng& rng, Batch& batch, TraceSt
                                           rng, counters, when);
     if (hit.happened()) flight.length = hit.distance;
     flight.extinctionAtEnd = hit.extinction;
-    batch.add(flight);
+    handOn(medium, flight, batch, when);
     ++stats.flights;
     if (!hit.happened()) {
       stats.escaped += Vec3d(flight.power);

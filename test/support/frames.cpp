@@ -12,6 +12,8 @@ render::FrameOptions frameOptions(const TestScene& scene, int samples, std::uint
   options.samples = samples;
   options.crop = {Vec2i(0), scene.camera->resolution()};
   options.key = RandomKey::fromSeed(seed, 0);
+  options.moving = scene.medium->isMoving();
+  options.shutter = scene.medium->shutter();
   return options;
 }
 

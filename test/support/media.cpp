@@ -101,6 +101,18 @@ transport::VolumeEmission sampledEmission(double edge, int cells,
   return e;
 }
 
+transport::VolumeMotion sampledMotion(double edge, int cells,
+                                      const std::function<Vec3d(const Vec3d&)>& v) {
+  transport::VolumeMotion motion;
+  motion.localFromNode = placement(Vec3d(edge), Vec3i(cells));
+  motion.velocity = sampleNodes<Vec4f>(cells, motion.localFromNode,
+                                       [&](const Vec3d& p) { return Vec4f(Vec3f(v(p)), 0.0f); });
+  volume::forEachNode(motion.velocity, [&](const Vec4f& node) {
+    motion.fastest = std::max(motion.fastest, glm::length(Vec3d(node)));
+  });
+  return motion;
+}
+
 double plumeDensity(const Vec3d& p) {
   const double height = p.z + 0.5;  // 0 to 1
   const double width = 0.08 + 0.3 * height;

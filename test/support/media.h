@@ -28,6 +28,11 @@ transport::MediumVolume sampledVolume(double edge, int cells, const MediumOption
 transport::VolumeEmission sampledEmission(double edge, int cells,
                                           const std::function<Rgb(const Vec3d&)>& j);
 
+/// Velocity sampled at the nodes of that lattice, with the field's own largest as `fastest`.
+/// @param v  [m/s]
+transport::VolumeMotion sampledMotion(double edge, int cells,
+                                      const std::function<Vec3d(const Vec3d&)>& v);
+
 /// Density of a fractal plume in a unit cube about the origin: a rising, widening column eaten away
 /// by value noise. Largest value about 1.
 double plumeDensity(const Vec3d& p);

@@ -143,6 +143,11 @@ class Medium {
   /// Extinction of each channel over `extinction`, where that is the same everywhere.
   const Rgb* tint() const { return m_tint ? &*m_tint : nullptr; }
 
+  /// Where the smoke that is at `p` then lies at the frame's own time; of several volumes, the mean
+  /// by their extinction. Light is stored there, so that it rides with the smoke.
+  Vec3f carrierOf(const Vec3f& p, Still) const { return p; }
+  Vec3f carrierOf(const Vec3f& p, Moment when) const;
+
   /// Where what one of the emitting volumes has at `p` at the frame's own time lies then.
   /// @param emitter  Emission::Birth::volume
   Vec3f moved(std::size_t, const Vec3f& p, Still) const { return p; }

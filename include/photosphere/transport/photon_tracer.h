@@ -19,8 +19,9 @@ using LightList = std::vector<std::unique_ptr<lights::Light>>;
 /// Stands for a lamp's index where the smoke's own emission is the source.
 inline constexpr std::uint32_t kEmittedBySmoke = ~0u;
 
-/// One straight flight of a photon, from real collision (or entry) to real collision (or exit).
-/// Local space.
+/// One straight flight of a photon, from real collision (or entry) to real collision (or exit), or
+/// a piece of one: where the smoke moves, pieces lie where their smoke does at the frame's own
+/// time. Local space.
 struct Flight {
   Vec3f origin{0.0f};
   float length = 0.0f;            ///< inside the medium's bounds [m]
