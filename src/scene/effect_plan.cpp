@@ -133,7 +133,7 @@ class EffectPlan {
   const PreRender& picture() {
     if (!m_picture) {
       Effects effects = m_setup.effects;
-      effects.shadows = true;
+      effects.shadows = !isOff("shadows");
       m_picture = preRender(m_setup, effects);
     }
     return *m_picture;
