@@ -43,7 +43,8 @@ std::span<const Param> cameraParams() {
        .type = ParamType::vec2,
        .unit = "frames",
        .defaultText = "[-0.25, 0.25]",
-       .help = "when it opens and closes, relative to the frame"},
+       .help = "when it opens and closes, relative to the frame; the camera moves in between where "
+               "it has keys or a file"},
       {.name = "fstop",
        .type = ParamType::real,
        .unit = "",
@@ -60,8 +61,10 @@ std::span<const Param> cameraParams() {
        .type = ParamType::text,
        .unit = "",
        .defaultText = "",
-       .help = "Nuke .chan file in place of the keys above",
-       .served = false},
+       .help = "Nuke camera (.chan) in place of position, look_at, up, matrix and, where its lines "
+               "have an eighth number, the field of view: lines of frame, translation, rotation "
+               "[degrees, order ZXY] and vertical field of view [degrees; the resolution's aspect "
+               "makes it horizontal]; between lines the rotation turns evenly"},
   };
   return params;
 }

@@ -1,7 +1,6 @@
-// Shines alike into all directions from one point.
+// Shines alike into all directions, from one point or from a ball.
 
-#include "cone.h"
-#include "rows.h"
+#include "ball.h"
 
 namespace photosphere::lights::plugins {
 
@@ -47,8 +46,11 @@ constexpr Param params[] = {
 };
 
 std::unique_ptr<Light> create(const ParamValues& values, const LocalSpace& space) {
-  return std::make_unique<PointLight>(space.localFromWorld(values.vec3("position")),
-                                      scaledColor(values));
+  const Vec3d position = space.localFromWorld(values.vec3("position"));
+  const double radius = values.real("radius") * space.metersPerUnit;
+  if (radius > roundingAt(position))
+    return std::make_unique<BallLight>(position, ballRadiance(scaledColor(values), radius), radius);
+  return std::make_unique<PointLight>(position, scaledColor(values));
 }
 
 }  // namespace

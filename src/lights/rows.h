@@ -46,9 +46,11 @@ constexpr Param softRadiusRow() {
           .type = ParamType::real,
           .unit = "scene units",
           .defaultText = "0.0",
-          .help = "of the light's body, for soft shadows",
+          .help =
+              "of the ball that it shines from, with the same intensity, for soft shadows; "
+              "dark inside; 0 = a point",
           .min = 0.0,
-          .served = false};
+          .max = 1e9};
 }
 
 constexpr Param bodyRadiusRow() {
@@ -73,15 +75,19 @@ inline bool isGreyColor(const Rgb& c) {
 /// Unit vector from `position` to `target`. @throws ConfigError when they coincide
 Vec3d directionFromValues(const ParamValues& values, std::string_view light);
 
+/// The rounding of a float position there, which is nowhere below a nanometre [m].
+/// @param position  local space [m]
+inline double roundingAt(const Vec3d& position) {
+  return glm::max(1e-9, 1e-7 * glm::length(position));
+}
+
 /// A source of light at one point, ready to be asked often.
 class PointSource {
  public:
   /// @param position   local space [m]
   /// @param intensity  [W/sr]
   PointSource(const Vec3d& position, const Rgb& intensity)
-      : m_position(position),
-        m_intensity(intensity),
-        m_largestInverse(1 / glm::max(1e-9, 1e-7 * glm::length(position))) {}
+      : m_position(position), m_intensity(intensity), m_largestInverse(1 / roundingAt(position)) {}
 
   const Vec3d& position() const { return m_position; }
   const Rgb& intensity() const { return m_intensity; }

@@ -75,7 +75,7 @@ class FrameLoop {
         m_out(out),
         m_filter(options.filter, options.filterWidth),
         m_border(static_cast<int>(std::ceil(m_filter.radius() - 0.5))),
-        m_axis(camera.viewDirection()),
+        m_still(cameras::placementOf(camera)),
         m_sums(static_cast<std::size_t>(out.width()) * static_cast<std::size_t>(out.height())) {}
 
   void run() {
@@ -154,12 +154,16 @@ class FrameLoop {
       Rng rng(m_options.key, RandomStream::camera,
               static_cast<std::uint64_t>(firstSample + s) << 40 | pixel);
       const Vec2d raster = Vec2d(x + 0.5, y + 0.5) + m_offsets[static_cast<std::size_t>(s)];
-      cameras::CameraRay ray = m_camera.ray(raster);
-      if (m_options.lens.radius > 0.0) ray = throughLens(ray, lensPoint(firstSample + s, pixel));
       const float u = m_options.moving ? shutterTime(firstSample + s, pixel) : 0.5f;
+      const cameras::MovingCamera* motion = m_options.motion;
+      const cameras::Placement place = motion ? motion->placement(u) : m_still;
+      cameras::CameraRay ray = motion ? motion->ray(raster, u) : m_camera.ray(raster);
+      if (m_options.lens.radius > 0.0)
+        ray = throughLens(ray, place, lensPoint(firstSample + s, pixel));
       RayRadiance r = m_integrator.radiance(m_options.space.localFromWorld(ray.origin),
                                             Vec3f(ray.direction), moment(u), rng, counters);
-      if (!m_camera.isPanorama()) r.depth *= static_cast<float>(glm::dot(ray.direction, m_axis));
+      if (!m_camera.isPanorama())
+        r.depth *= static_cast<float>(glm::dot(ray.direction, place.axis));
       const bool nan = isNan(r);
       if (nan || isNegative(r)) {
         ++(nan ? bad.nans : bad.negatives);
@@ -195,18 +199,16 @@ class FrameLoop {
   }
 
   // The ray from a point of the lens to where the ray through its middle meets the plane in focus.
-  cameras::CameraRay throughLens(const cameras::CameraRay& ray, const Vec2f& point) const {
-    const Mat4d& place = m_camera.worldFromCamera();
-    const Vec3d focus = m_camera.position() + ray.direction * (m_options.lens.focusDistance /
-                                                               glm::dot(ray.direction, m_axis));
-    const Vec3d shift =
-        m_options.lens.radius * (glm::normalize(Vec3d(place[0])) * static_cast<double>(point.x) +
-                                 glm::normalize(Vec3d(place[1])) * static_cast<double>(point.y));
-    const Vec3d direction = glm::normalize(focus - (m_camera.position() + shift));
+  cameras::CameraRay throughLens(const cameras::CameraRay& ray, const cameras::Placement& place,
+                                 const Vec2f& point) const {
+    const Vec3d focus = place.eye + ray.direction * (m_options.lens.focusDistance /
+                                                     glm::dot(ray.direction, place.axis));
+    const Vec3d shift = m_options.lens.radius * (place.right * static_cast<double>(point.x) +
+                                                 place.up * static_cast<double>(point.y));
+    const Vec3d direction = glm::normalize(focus - (place.eye + shift));
     // It begins where the other does, at the same distance along the axis.
-    const double near = glm::dot(ray.origin - m_camera.position(), m_axis);
-    return {m_camera.position() + shift + direction * (near / glm::dot(direction, m_axis)),
-            direction};
+    const double near = glm::dot(ray.origin - place.eye, place.axis);
+    return {place.eye + shift + direction * (near / glm::dot(direction, place.axis)), direction};
   }
 
   void report(const IntegratorCounters& counters, const Bad& bad) {
@@ -272,7 +274,7 @@ class FrameLoop {
   FrameLayers& m_out;
   PixelFilter m_filter;
   int m_border;
-  Vec3d m_axis;
+  cameras::Placement m_still;
   int m_count = 0;
   std::array<Vec2d, kSamplesAtOnce> m_offsets{};
   std::vector<PixelSum> m_sums;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "camera_setup.h"
 #include "light_bounds.h"
 #include "photosphere/core/error.h"
 #include "photosphere/phase/phase.h"
@@ -23,7 +24,7 @@ DirectionCone seenDirections(const SceneFile& scene, const FrameSetup& setup) {
   constexpr double border = 8, rounding = 1e-5;
   DirectionCone cone;
   cone.axis = -setup.camera->viewDirection();
-  if (setup.camera->isPanorama()) return cone;
+  if (setup.camera->isPanorama() || setup.motion) return cone;
   cone.angle = rounding;
   const Vec2d size(setup.camera->resolution());
   const double beyond = border + scene.render.real("filter_width");
@@ -263,24 +264,27 @@ class EffectPlan {
     return decision;
   }
 
-  // Off where the smoke moves light by less than shows, as depth of field is.
+  // Off where smoke and camera move light by less than shows, as depth of field is.
   Decision motionBlur() {
     if (isOff("motion_blur")) return {false, "off in the scene"};
     const transport::Medium& medium = *m_setup.medium;
-    if (!medium.isMoving()) {
-      std::string why = "no volume has a velocity";
-      for (const VolumeEntry& volume : m_scene.volumes)
-        if (!volume.values.text("velocity").empty())
-          why = "no smoke moves while the shutter is open";
-      return unlessNever("motion_blur", why, "");
-    }
-    const double pixels = medium.displacement() / m_setup.space.metersPerUnit * pixelsPerUnit();
-    const std::string why =
-        fmt::format("the smoke moves by up to {:.2g} pixels while the shutter is open", pixels);
+    if (!medium.isMoving() && !m_setup.motion)
+      return unlessNever("motion_blur", "no volume has a velocity, and the camera stands still",
+                         "");
+    double pixels = 0;
+    if (medium.isMoving())
+      pixels += medium.displacement() / m_setup.space.metersPerUnit * pixelsPerUnit();
+    if (m_setup.motion) pixels += m_setup.motion->blur(m_setup.worldBounds);
+    const std::string why = fmt::format("the {} by up to {:.2g} pixels while the shutter is open",
+                                        !m_setup.motion      ? "smoke moves"
+                                        : !medium.isMoving() ? "camera moves the smoke"
+                                                             : "smoke and the camera move it",
+                                        pixels);
     if (isOn("motion_blur") || m_forOtherViews) return {true, why};
     const std::optional<double> bound = affordShift(pixels);
     if (!bound) return {true, why};
-    *m_setup.medium = std::move(*m_setup.medium).held();
+    if (medium.isMoving()) *m_setup.medium = std::move(*m_setup.medium).held();
+    m_setup.motion.reset();
     return {false, fmt::format("{}, {}", why, share(*bound)), bound};
   }
   // Of the nearest smoke, in any direction [pixels per scene unit].
@@ -401,13 +405,6 @@ class EffectPlan {
 };
 
 }  // namespace
-
-double horizontalFov(const ParamValues& camera) {
-  if (camera.given("focal_length") || camera.given("horizontal_aperture"))
-    return 2 * std::atan(camera.real("horizontal_aperture") / 2 / camera.real("focal_length")) *
-           180 / kPi;
-  return camera.real("fov");
-}
 
 bool scattersEvenly(const transport::Medium& medium) {
   for (const phase::PhaseFunction& phase : medium.phases())

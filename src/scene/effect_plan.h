@@ -12,14 +12,11 @@
 
 namespace photosphere::scene {
 
-/// Degrees across the frame, as the camera's own options say.
-double horizontalFov(const ParamValues& camera);
-
 /// True when no phase function prefers a direction: light is then stored without directions.
 bool scattersEvenly(const transport::Medium& medium);
 
 /// Fills `effects`, `effectStates` and `lens` of a frame whose medium, lights and camera stand, and
-/// takes away lamps and glow that add nothing or too little.
+/// takes away lamps, glow and motion that add nothing or too little.
 /// @param forOtherViews  the light is kept for cameras that are not known: then only what adds
 ///                       exactly nothing to any picture is left out of it
 /// @throws ConfigError where the scene switches off what it cannot do without

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "camera_setup.h"
 #include "effect_plan.h"
 #include "estimator_options.h"
 #include "photon_map_stage.h"
@@ -133,6 +134,22 @@ bool visible(const VolumeSource& source, double densityScale) {
   return smoke || (source.emission && !source.emission.activeBounds().empty());
 }
 
+// Keyed values as they are at the frame, and the resolution that is asked for.
+SceneFile sceneOfFrame(const SceneFile& written, std::int64_t frame, const SetupOptions& options) {
+  SceneFile scene = written;
+  if (options.resolution)
+    scene.camera.set("resolution",
+                     std::vector<double>{static_cast<double>(options.resolution->x),
+                                         static_cast<double>(options.resolution->y)},
+                     scene.cameraWhere);
+  scene = sceneAt(scene, static_cast<double>(frame));
+  const Vec2d shutter = scene.camera.vec2("shutter");
+  if (shutter.y < shutter.x)
+    throw ConfigError(fmt::format("{}: 'shutter' closes at {}, before it opens at {}",
+                                  scene.cameraWhere, shutter.y, shutter.x));
+  return scene;
+}
+
 // Two passes: where the smoke is, then the smoke about its own centre.
 void buildMedium(const SceneFile& scene, std::int64_t cacheFrame, bool wantParticles,
                  FrameSetup& setup) {
@@ -196,54 +213,6 @@ void buildLights(const SceneFile& scene, FrameSetup& setup) {
   }
 }
 
-Vec2i resolutionOf(const SceneFile& scene, const SetupOptions& options) {
-  return options.resolution ? *options.resolution : Vec2i(scene.camera.vec2("resolution"));
-}
-
-// The width at which parallel rays from `placement` see the whole box.
-double widthOfBox(const Box3d& box, const Vec3d& target, const Mat4d& placement,
-                  const Vec2i& resolution) {
-  double half = 0;
-  for (int corner = 0; corner < 8; ++corner) {
-    const Vec3d p(corner & 1 ? box.max.x : box.min.x, corner & 2 ? box.max.y : box.min.y,
-                  corner & 4 ? box.max.z : box.min.z);
-    const double x = std::abs(glm::dot(p - target, Vec3d(placement[0])));
-    const double y = std::abs(glm::dot(p - target, Vec3d(placement[1])));
-    half = std::max(half, std::max(x, y * resolution.x / resolution.y));
-  }
-  return 2 * half;
-}
-
-void buildCamera(const SceneFile& scene, const SetupOptions& options, FrameSetup& setup) {
-  const cameras::CameraPlugin& plugin =
-      findPlugin(cameras::cameraModels(), scene.cameraType, "camera type", scene.cameraWhere);
-  const Vec2i resolution = resolutionOf(scene, options);
-  ParamValues values = scene.camera;
-  try {
-    Mat4d placement;
-    if (scene.framesSmoke() && !setup.worldBounds.empty()) {
-      const Vec3d target =
-          scene.camera.given("look_at") ? scene.camera.vec3("look_at") : setup.worldBounds.center();
-      const double fov = scene.cameraType == "perspective" ? horizontalFov(scene.camera) : 30.0;
-      placement = frameBox(setup.worldBounds, target, scene.camera.vec3("up"), fov, resolution);
-      if (scene.cameraType == "orthographic" && !values.given("width"))
-        values.set("width", widthOfBox(setup.worldBounds, target, placement, resolution),
-                   scene.cameraWhere);
-      setup.notes.push_back(
-          "[camera] has neither 'position' nor 'matrix': it frames the smoke of each frame anew; "
-          "place it to hold it still over a sequence");
-    } else {
-      placement = cameras::worldFromCameraValues(scene.camera);
-    }
-    setup.camera = plugin.create(values, placement, resolution);
-  } catch (const ConfigError& error) {
-    throw ConfigError(fmt::format("{}: {}", scene.cameraWhere, error.what()));
-  }
-  setup.view.hasEye = setup.camera->hasEye();
-  setup.view.eye = setup.space.localFromWorld(setup.camera->position());
-  setup.view.direction = Vec3f(setup.camera->viewDirection());
-}
-
 // Nearest-neighbour spacing of the carriers [m].
 double carrierSpacing(const std::vector<Vec3f>& particles) {
   volume::ParticleSet set;
@@ -265,6 +234,25 @@ double sharpestLobe(const transport::Medium& medium) {
   return sharpest;
 }
 
+// Angle under which smoke sees the eye move from where it is in the middle of the shutter, up to
+// which light for that one eye serves [rad].
+constexpr double kSmallParallax = 0.1;
+
+void heedParallax(const SceneFile& scene, FrameSetup& setup) {
+  estimators::LightFieldLayout& l = setup.layout;
+  const double parallax = setup.motion ? setup.motion->parallax(setup.worldBounds) : 0.0;
+  if (scene.estimator.text("type") != "photosphere" || l.basis != estimators::Basis::view ||
+      parallax <= kSmallParallax)
+    return;
+  const bool chosen = scene.estimator.text("basis") == "auto";
+  if (chosen) l.basis = estimators::Basis::histogram;
+  setup.notes.push_back(fmt::format(
+      "while the shutter is open the smoke sees the camera move by {:.2g} degrees: light is {}",
+      2 * parallax * 180 / kPi,
+      chosen ? fmt::format("stored in {} bins of direction, which serve every eye", l.bins())
+             : "stored for the eye in the middle; estimator.basis = \"histogram\" serves all"));
+}
+
 void buildLayout(const SceneFile& scene, const SetupOptions& options, FrameSetup& setup) {
   using namespace estimators;
   const ParamValues& e = scene.estimator;
@@ -281,12 +269,14 @@ void buildLayout(const SceneFile& scene, const SetupOptions& options, FrameSetup
                       "direction, as estimator.basis = \"view\" would be noisier",
                       g, l.bins()));
   }
+  // Light without directions serves every eye.
+  const bool even = scattersEvenly(*setup.medium);
+  if (!even) heedParallax(scene, setup);
   // Bins would all be read alike: one coefficient holds what counts.
   const bool ofBins = l.direction != sphere::DirectionDeposit::nearest ||
                       l.representative != Representative::bin || l.merge != Merge::full ||
                       l.angularKernel != sphere::AngularKernel::none;
-  if (e.text("basis") == "auto" && l.basis == Basis::histogram && !ofBins &&
-      scattersEvenly(*setup.medium)) {
+  if (e.text("basis") == "auto" && l.basis == Basis::histogram && !ofBins && even) {
     l.basis = Basis::sphericalHarmonics;
     l.order = 0;
   }
@@ -311,7 +301,8 @@ void buildLayout(const SceneFile& scene, const SetupOptions& options, FrameSetup
 
 }  // namespace
 
-FrameSetup setUpFrame(const SceneFile& scene, std::int64_t frame, const SetupOptions& options) {
+FrameSetup setUpFrame(const SceneFile& written, std::int64_t frame, const SetupOptions& options) {
+  const SceneFile scene = sceneOfFrame(written, frame, options);
   FrameSetup setup;
   setup.frame = frame;
   setup.memoryBudget = memoryBudget(scene);
@@ -319,8 +310,9 @@ FrameSetup setUpFrame(const SceneFile& scene, std::int64_t frame, const SetupOpt
                          scene.estimator.text("carrier") == "particles";
   buildMedium(scene, options.cacheFrame.value_or(frame), particles, setup);
   buildLights(scene, setup);
-  buildCamera(scene, options, setup);
+  buildCamera(scene, setup);
   planEffects(scene, options.forLightCache || !scene.estimator.text("cache").empty(), setup);
+  viewFromTheMiddle(setup);
   buildLayout(scene, options, setup);
   const std::int64_t seed = options.seed.value_or(scene.scene.integer("seed"));
   setup.key = RandomKey::fromSeed(static_cast<std::uint64_t>(seed),
@@ -388,26 +380,6 @@ void checkMemory(const FrameSetup& setup, bool storedLight) {
       "is {}. {}, lower the resolution, or raise render.memory_limit (-1 = none)",
       formatBytes(memory.total()), formatBytes(memory.smoke), formatBytes(memory.light),
       formatBytes(memory.pixels), formatBytes(setup.memoryBudget), less));
-}
-
-Mat4d frameBox(const Box3d& box, const Vec3d& target, const Vec3d& up, double fovDegrees,
-               const Vec2i& resolution) {
-  // The front is +Z where Y is up, -Y where Z is up.
-  const bool zUp = std::abs(up.z) > std::abs(up.y);
-  const Vec3d toEye = glm::normalize(zUp ? Vec3d(0.5, -1.0, 0.3) : Vec3d(0.5, 0.3, 1.0));
-  const Mat4d axes = cameras::lookAt(target + toEye, target, up);
-  const double tanX = std::tan(fovDegrees * kPi / 360);
-  const double tanY = tanX * resolution.y / resolution.x;
-  double distance = 0;
-  for (int corner = 0; corner < 8; ++corner) {
-    const Vec3d p(corner & 1 ? box.max.x : box.min.x, corner & 2 ? box.max.y : box.min.y,
-                  corner & 4 ? box.max.z : box.min.z);
-    const Vec3d d = p - target;
-    const double x = std::abs(glm::dot(d, Vec3d(axes[0])));
-    const double y = std::abs(glm::dot(d, Vec3d(axes[1])));
-    distance = std::max(distance, std::max(x / tanX, y / tanY) + glm::dot(d, toEye));
-  }
-  return cameras::lookAt(target + toEye * std::max(distance, 1e-9), target, up);
 }
 
 }  // namespace photosphere::scene

@@ -47,8 +47,9 @@ render::FrameOptions frameOptions(const SceneFile& scene, const render::Crop& cr
   options.crop = crop;
   options.space = setup.space;
   options.lens = setup.lens;
-  options.moving = setup.medium->isMoving();
+  options.moving = setup.medium->isMoving() || setup.motion;
   options.shutter = setup.medium->shutter();
+  options.motion = setup.motion.get();
   return options;
 }
 

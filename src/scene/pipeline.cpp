@@ -96,9 +96,11 @@ void startStatistics(const SceneFile& scene, const FrameSetup& setup, FrameStati
 
 }  // namespace
 
-FrameResult renderScene(const SceneFile& scene, std::int64_t frame, const RenderRequest& request) {
+FrameResult renderScene(const SceneFile& written, std::int64_t frame,
+                        const RenderRequest& request) {
   const Stopwatch total;
   const double cpuBefore = processCpuSeconds();
+  const SceneFile scene = sceneAt(written, static_cast<double>(frame));
   FrameSetup setup = setUpFrame(scene, frame, setupOptions(request));
   const render::Crop crop = clippedCrop(request.crop, setup.camera->resolution());
   FrameResult result;
@@ -120,8 +122,9 @@ FrameResult renderScene(const SceneFile& scene, std::int64_t frame, const Render
   return result;
 }
 
-FrameStatistics traceScene(const SceneFile& scene, std::int64_t frame, const std::string& output,
+FrameStatistics traceScene(const SceneFile& written, std::int64_t frame, const std::string& output,
                            const RenderRequest& request) {
+  const SceneFile scene = sceneAt(written, static_cast<double>(frame));
   if (scene.estimator.text("type") != "photosphere")
     throw ConfigError(
         fmt::format("estimator.type = \"{}\" has no light cache; tracing one needs \"photosphere\"",

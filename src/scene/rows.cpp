@@ -365,7 +365,7 @@ std::span<const Param> effectsParams() {
        .type = ParamType::text,
        .unit = "",
        .defaultText = "auto",
-       .help = "from `velocity` over the shutter",
+       .help = "from smoke's `velocity` and the camera's keys or file, over the shutter",
        .choices = states},
       {.name = "depth_of_field",
        .type = ParamType::text,

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <fstream>
 #include <sstream>
 
@@ -17,7 +18,7 @@ namespace {
 enum class DumpPurpose { file, hash };
 
 bool isPath(std::string_view table, std::string_view key) {
-  return ((table == "volume" || table == "light") && key == "file") ||
+  return ((table == "volume" || table == "light" || table == "camera") && key == "file") ||
          (table == "estimator" && key == "cache") ||
          (table == "output" && (key == "file" || key == "preview"));
 }
@@ -31,11 +32,14 @@ class Dumper {
       for (const std::string& choice : m_scene.choices)
         m_text += "# " + choice + "\n";
     table("scene", "[scene]", m_scene.scene);
-    table("camera", "[camera]", m_scene.camera, fmt::format("type = \"{}\"\n", m_scene.cameraType));
+    table("camera", "[camera]", m_scene.camera, fmt::format("type = \"{}\"\n", m_scene.cameraType),
+          m_scene.cameraKeys);
+    if (m_purpose == DumpPurpose::hash) shot();
     for (const VolumeEntry& volume : m_scene.volumes)
-      table("volume", "[[volume]]", volume.values, volumeExtras(volume));
+      table("volume", "[[volume]]", volume.values, volumeExtras(volume), volume.keys);
     for (const LightEntry& light : m_scene.lights)
-      table("light", "[[light]]", light.values, fmt::format("type = \"{}\"\n", light.type));
+      table("light", "[[light]]", light.values, fmt::format("type = \"{}\"\n", light.type),
+            light.keys);
     table("estimator", "[estimator]", m_scene.estimator);
     table("effects", "[effects]", m_scene.effects);
     table("render", "[render]", m_scene.render);
@@ -51,28 +55,47 @@ class Dumper {
     extras += fmt::format("phase = {{ type = \"{}\"", volume.phase);
     for (const Param& row : volume.phaseValues.rows())
       if (row.served)
-        extras += fmt::format(", {} = {}", row.name, volume.phaseValues.format(row.name));
+        extras +=
+            fmt::format(", {} = {}", row.name, written(row, volume.phaseValues, volume.phaseKeys));
     extras += " }\n";
     if (!volume.emits) return extras;
     std::vector<std::string> keys;
     for (const Param& row : volume.emission.rows())
       if (volume.emission.given(row.name))
-        keys.push_back(fmt::format("{} = {}", row.name, volume.emission.format(row.name)));
+        keys.push_back(
+            fmt::format("{} = {}", row.name, written(row, volume.emission, volume.emissionKeys)));
     return extras + fmt::format("emission = {{ {} }}\n", fmt::join(keys, ", "));
+  }
+
+  // A value, or its keys.
+  static std::string written(const Param& row, const ParamValues& values, const Tracks& keys) {
+    const auto track = keys.find(row.name);
+    return track == keys.end() ? values.format(row.name) : formatTrack(row, track->second);
+  }
+
+  // What a camera's file holds: its name alone would not do, as it is edited in place.
+  void shot() {
+    for (const auto& [name, track] : m_scene.shot)
+      for (const Key& key : track)
+        m_text += fmt::format("{} {} {}\n", name, key.frame, fmt::join(key.value, " "));
   }
 
   // Given values as they are; the others as comments with their defaults, ready to be edited.
   void table(std::string_view name, std::string_view head, const ParamValues& values,
-             const std::string& extras = {}) {
+             const std::string& extras = {}, const Tracks& keys = {}) {
     m_text += fmt::format("{}{}\n{}", m_text.empty() ? "" : "\n", head, extras);
     std::string defaults;
     for (const Param& row : values.rows()) {
       if (!row.served || (name == "volume" && row.name == "albedo" && extras.starts_with("albedo")))
         continue;
-      std::string value = values.format(row.name);
+      // A frame's values of what a camera's file says.
+      if (name == "camera" && m_scene.shot.contains(row.name == "fov" ? kShotFov : row.name))
+        continue;
+      std::string value = written(row, values, keys);
       const bool path = isPath(name, row.name) && !values.text(row.name).empty();
       const bool frames = name == "scene" && row.name == "frames";
-      // A picture of the surroundings is known by its name alone; smoke has hashes of its own.
+      // A picture of the surroundings is known by its name alone; smoke has hashes of its own, and
+      // what a camera's file holds stands below.
       const bool named = path && name == "light";
       if (((path && !named) || frames) && m_purpose == DumpPurpose::hash) continue;
       if (path && m_purpose == DumpPurpose::file) {
@@ -111,13 +134,41 @@ std::string SceneFile::resolvePath(const std::string& written) const {
 }
 
 bool SceneFile::framesSmoke() const {
-  return !camera.given("position") && !camera.given("matrix");
+  return !camera.given("position") && !camera.given("matrix") && shot.empty();
 }
 
 std::string SceneFile::hash() const {
   Hasher hasher;
   hasher.text(Dumper(*this, DumpPurpose::hash).text());
   return hasher.hex();
+}
+
+ParamValues cameraAt(const SceneFile& scene, double time) {
+  ParamValues values = scene.camera;
+  setToTime(scene.cameraKeys, time, values, scene.cameraWhere);
+  const auto place = scene.shot.find("matrix");
+  if (place == scene.shot.end()) return values;
+  values.set("matrix", valueAt(ParamType::matrix, place->second, time), scene.cameraWhere);
+  const auto fov = scene.shot.find(kShotFov);
+  if (fov == scene.shot.end() || scene.cameraType != "perspective") return values;
+  const double vertical = valueAt(ParamType::real, fov->second, time).front() * kPi / 180;
+  const Vec2d size = values.vec2("resolution");
+  const double horizontal = 2 * std::atan(std::tan(vertical / 2) * size.x / size.y);
+  values.set("fov", horizontal * 180 / kPi, scene.cameraWhere);
+  return values;
+}
+
+SceneFile sceneAt(const SceneFile& scene, double time) {
+  SceneFile at = scene;
+  at.camera = cameraAt(scene, time);
+  for (VolumeEntry& volume : at.volumes) {
+    setToTime(volume.keys, time, volume.values, volume.where);
+    setToTime(volume.phaseKeys, time, volume.phaseValues, volume.where);
+    setToTime(volume.emissionKeys, time, volume.emission, volume.where);
+  }
+  for (LightEntry& light : at.lights)
+    setToTime(light.keys, time, light.values, light.where);
+  return at;
 }
 
 SceneFile parseScene(const std::string& text, const std::string& name,

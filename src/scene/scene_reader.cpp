@@ -8,6 +8,7 @@
 
 #include "estimator_options.h"
 #include "photosphere/cameras/camera.h"
+#include "photosphere/cameras/chan.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/frames.h"
 #include "photosphere/core/registry.h"
@@ -18,10 +19,6 @@ namespace photosphere::scene {
 
 namespace {
 
-[[noreturn]] void notServed(const std::string& place, std::string_view what) {
-  throw ConfigError(fmt::format("{}: {} is not served by this version yet", place, what));
-}
-
 std::string textOf(const toml::node& node, std::string_view key, const std::string& place) {
   const auto* text = node.as_string();
   if (!text) throw ConfigError(fmt::format("{}: '{}' must be text", place, key));
@@ -30,7 +27,9 @@ std::string textOf(const toml::node& node, std::string_view key, const std::stri
 
 ParamValue arrayValue(const toml::array& array, std::string_view key, const std::string& place) {
   if (!array.empty() && array.front().is_table())
-    notServed(place, fmt::format("'{}' with keys over time (an array of tables)", key));
+    throw ConfigError(fmt::format(
+        "{}: '{}' cannot have keys over time; numbers of the camera, volumes and lights can", place,
+        key));
   std::vector<double> numbers;
   std::vector<std::string> texts;
   for (const toml::node& item : array) {
@@ -126,6 +125,51 @@ void SceneReader::readPlain(const std::string& name, ParamValues& values) const 
   }
 }
 
+void SceneReader::readAnimated(const std::string& path, const std::string& key,
+                               const toml::node& node, ParamValues& values, Tracks& keys) const {
+  const std::string place = where(node, path + "." + key, path);
+  if (!hasRow(values, key)) return values.set(key, ParamValue(), place);  // reports the unknown key
+  const toml::array* array = node.as_array();
+  const Param& row = *std::find_if(values.rows().begin(), values.rows().end(),
+                                   [&](const Param& p) { return p.name == key; });
+  // The size of a frame stays.
+  if (array && !array->empty() && array->front().is_table() && isKeyable(row.type) &&
+      key != "resolution")
+    return readKeys(path, row, *array, values, keys);
+  values.set(key, valueOf(node, key, place), place);
+}
+
+void SceneReader::readKeys(const std::string& path, const Param& row, const toml::array& from,
+                           ParamValues& values, Tracks& keys) const {
+  const std::string key(row.name);
+  Track track;
+  for (std::size_t i = 0; i < from.size(); ++i) {
+    const toml::node& item = *from.get(i);
+    const std::string place = where(item, fmt::format("{}.{}.{}", path, key, i), path);
+    const toml::table* entry = item.as_table();
+    const toml::node* frame = entry ? entry->get("frame") : nullptr;
+    const toml::node* value = entry ? entry->get("value") : nullptr;
+    if (!frame || !frame->is_number() || !value || entry->size() != 2)
+      throw ConfigError(fmt::format(
+          "{}: every key of '{}' is a table of two, {{ frame = 1, value = ... }}", place, key));
+    const double time = *frame->value<double>();
+    if (!std::isfinite(time))
+      throw ConfigError(fmt::format("{}: a key of '{}' has no finite frame", place, key));
+    if (!track.empty() && !(time > track.back().frame))
+      throw ConfigError(
+          fmt::format("{}: the keys of '{}' must stand in the order of their frames, each frame "
+                      "once; {} comes after {}",
+                      place, key, time, track.back().frame));
+    values.set(key, valueOf(*value, key, place), place);
+    track.push_back({time, numbersOf(values, row)});
+  }
+  const std::string place = where(from, path + "." + key, path);
+  const std::string complaint = matrixComplaint(track);
+  if (!complaint.empty()) throw ConfigError(fmt::format("{}: '{}': {}", place, key, complaint));
+  keys[key] = std::move(track);
+  setToTime({{key, {keys[key].front()}}}, 0, values, place);
+}
+
 void SceneReader::readScene() {
   const toml::table* from = table("scene");
   if (!from) return;
@@ -166,16 +210,41 @@ void SceneReader::readCamera() {
     const std::string at = where(node, "camera." + k, "camera");
     if (!hasRow(m_scene.camera, k))
       explainForeignKey(cameras::cameraModels(), k, "camera type", m_scene.cameraType, at);
-    m_scene.camera.set(k, hasRow(m_scene.camera, k) ? valueOf(node, k, at) : ParamValue(), at);
+    readAnimated("camera", k, node, m_scene.camera, m_scene.cameraKeys);
     if (k == "resolution" && m_scene.camera.vec2(k) != glm::floor(m_scene.camera.vec2(k)))
       throw ConfigError(fmt::format("{}: 'resolution' must be two whole numbers", at));
   }
+  readShot();
 }
 
-void SceneReader::readAlbedo(const toml::node& node, const std::string& place,
+void SceneReader::readShot() {
+  const std::string& file = m_scene.camera.text("file");
+  if (file.empty()) return;
+  const auto refuse = [&](std::string_view key) {
+    if (hasRow(m_scene.camera, key) && m_scene.camera.given(key))
+      throw ConfigError(fmt::format("{}: 'file' says what '{}' does; remove one of them",
+                                    m_scene.cameraWhere, key));
+  };
+  for (const std::string_view key : {"position", "look_at", "up", "matrix"})
+    refuse(key);
+  for (const cameras::ChanKey& line : cameras::readChan(m_scene.resolvePath(file))) {
+    std::vector<double> rows;
+    for (int i = 0; i < 16; ++i)
+      rows.push_back(line.worldFromCamera[i % 4][i / 4]);
+    m_scene.shot["matrix"].push_back({line.frame, rows});
+    if (line.verticalFov > 0)
+      m_scene.shot[std::string(kShotFov)].push_back({line.frame, {line.verticalFov}});
+  }
+  if (m_scene.shot.contains(kShotFov))
+    for (const std::string_view key : {"fov", "focal_length", "horizontal_aperture"})
+      refuse(key);
+}
+
+void SceneReader::readAlbedo(const toml::node& node, const std::string& path,
                              VolumeEntry& entry) const {
+  const std::string place = where(node, path + ".albedo", path);
   if (!node.is_string()) {
-    entry.values.set("albedo", valueOf(node, "albedo", place), place);
+    readAnimated(path, "albedo", node, entry.values, entry.keys);
     return;
   }
   entry.albedoGrid = textOf(node, "albedo", place);
@@ -202,11 +271,16 @@ void SceneReader::readPhase(const toml::node& node, const std::string& path,
     const std::string at = where(value, path + "." + k, path);
     if (!hasRow(entry.phaseValues, k))
       explainForeignKey(phase::phaseFunctions(), k, "phase function", entry.phase, at);
-    entry.phaseValues.set(k, hasRow(entry.phaseValues, k) ? valueOf(value, k, at) : ParamValue(),
-                          at);
+    readAnimated(path, k, value, entry.phaseValues, entry.phaseKeys);
   }
   try {
     plugin.create(entry.phaseValues);
+    for (const auto& [name, track] : entry.phaseKeys)
+      for (const Key& key : track) {
+        ParamValues then = entry.phaseValues;
+        setToTime(entry.phaseKeys, key.frame, then, place);
+        plugin.create(then);
+      }
   } catch (const ConfigError& error) {
     throw ConfigError(fmt::format("{}: {}", place, error.what()));
   }
@@ -222,8 +296,7 @@ void SceneReader::readEmission(const toml::node& node, const std::string& path,
   entry.emits = true;
   for (const auto& [key, value] : *from) {
     const std::string k(key.str());
-    const std::string at = where(value, path + "." + k, path);
-    entry.emission.set(k, hasRow(entry.emission, k) ? valueOf(value, k, at) : ParamValue(), at);
+    readAnimated(path, k, value, entry.emission, entry.emissionKeys);
   }
   const bool thermal = !entry.emission.text("temperature").empty();
   if (thermal == !entry.emission.text("grid").empty())
@@ -249,11 +322,11 @@ void SceneReader::readVolume(const toml::table& from, std::size_t index) {
     if (k == "phase") {
       readPhase(node, path + ".phase", entry);
     } else if (k == "albedo") {
-      readAlbedo(node, place, entry);
+      readAlbedo(node, path, entry);
     } else if (k == "emission") {
       readEmission(node, path + ".emission", entry);
     } else {
-      entry.values.set(k, hasRow(entry.values, k) ? valueOf(node, k, place) : ParamValue(), place);
+      readAnimated(path, k, node, entry.values, entry.keys);
     }
   }
   if (entry.values.text("file").empty())
@@ -281,7 +354,7 @@ void SceneReader::readLight(const toml::table& from, std::size_t index) {
     const std::string place = where(node, path + "." + k, path);
     if (!hasRow(entry.values, k))
       explainForeignKey(lights::lightModels(), k, "light type", entry.type, place);
-    entry.values.set(k, hasRow(entry.values, k) ? valueOf(node, k, place) : ParamValue(), place);
+    readAnimated(path, k, node, entry.values, entry.keys);
   }
   m_scene.lights.push_back(std::move(entry));
 }

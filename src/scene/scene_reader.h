@@ -26,10 +26,16 @@ class SceneReader {
   const toml::table* table(const std::string& name) const;
   const toml::array* tables(const std::string& name) const;
   void readPlain(const std::string& name, ParamValues& values) const;
+  /// Sets a value that may have keys over time. @param path  of its table, such as `light.0`
+  void readAnimated(const std::string& path, const std::string& key, const toml::node& node,
+                    ParamValues& values, Tracks& keys) const;
+  void readKeys(const std::string& path, const Param& row, const toml::array& from,
+                ParamValues& values, Tracks& keys) const;
   void readScene();
   void readCamera();
+  void readShot();
   void readVolume(const toml::table& from, std::size_t index);
-  void readAlbedo(const toml::node& node, const std::string& place, VolumeEntry& entry) const;
+  void readAlbedo(const toml::node& node, const std::string& path, VolumeEntry& entry) const;
   void readPhase(const toml::node& node, const std::string& path, VolumeEntry& entry) const;
   void readEmission(const toml::node& node, const std::string& path, VolumeEntry& entry) const;
   void readLight(const toml::table& from, std::size_t index);

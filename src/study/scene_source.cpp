@@ -13,7 +13,7 @@ constexpr int kReferenceVersion = 1;
 
 // Rows that pixels of a converged frame do not depend on.
 bool irrelevant(std::string_view table, std::string_view name) {
-  if (table == "volume") return name == "file";
+  if (table == "volume" || table == "camera") return name == "file";
   if (table == "scene") return name != "meters_per_unit";
   if (table == "render") return name != "filter" && name != "filter_width";
   if (table == "light") return name == "name";
@@ -33,6 +33,17 @@ void hashTable(Hasher& hasher, std::string_view table, const ParamValues& values
   }
 }
 
+// What moves the camera while its shutter is open.
+void hashMotion(Hasher& hasher, const scene::Tracks& tracks) {
+  for (const auto& [name, track] : tracks) {
+    hasher.text(name);
+    for (const scene::Key& key : track) {
+      hasher.number(key.frame);
+      hasher.numbers(key.value.data(), key.value.size());
+    }
+  }
+}
+
 }  // namespace
 
 scene::SceneFile SceneSource::open(const std::vector<std::string>& more) const {
@@ -48,8 +59,9 @@ SceneSource SceneSource::with(const std::vector<std::string>& more) const {
   return source;
 }
 
-std::string referenceKey(const scene::SceneFile& scene, std::int64_t frame,
+std::string referenceKey(const scene::SceneFile& written, std::int64_t frame,
                          const std::string& mediumHash) {
+  const scene::SceneFile scene = scene::sceneAt(written, static_cast<double>(frame));
   Hasher hasher;
   hasher.number(kReferenceVersion);
   hasher.number(frame);
@@ -57,6 +69,8 @@ std::string referenceKey(const scene::SceneFile& scene, std::int64_t frame,
   hasher.text(scene.cameraType);
   hashTable(hasher, "scene", scene.scene);
   hashTable(hasher, "camera", scene.camera);
+  hashMotion(hasher, scene.cameraKeys);
+  hashMotion(hasher, scene.shot);
   for (const scene::VolumeEntry& volume : scene.volumes) {
     hasher.text(volume.phase);
     hasher.text(volume.albedoGrid);

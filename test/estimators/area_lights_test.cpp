@@ -47,6 +47,14 @@ TEST(AreaLights, AgreeWithPathTracing) {
         {"radius", "0.5"},
         {"intensity", "20"}}},
       {"sphere", {{"position", "[0.9, 0.3, 0.5]"}, {"radius", "0.25"}, {"intensity", "30"}}},
+      {"point", {{"position", "[-1, 0.7, 0.8]"}, {"radius", "0.3"}, {"intensity", "8"}}},
+      {"spot",
+       {{"position", "[1, -1, 0.8]"},
+        {"target", "[0, 0, 0]"},
+        {"cone_angle", "25"},
+        {"cone_edge", "8"},
+        {"radius", "0.25"},
+        {"intensity", "12"}}},
       {"environment", {{"file", writeSky(folder)}, {"intensity", "1"}}},
   };
   for (const Row& row : rows) {

@@ -140,6 +140,16 @@ TEST(Limits, IlluminationIsFiniteAtAndAroundTheLight) {
   }
 }
 
+TEST(Limits, SoftLightsTakeNoPowerToEmptyBounds) {
+  for (const char* type : {"point", "spot"}) {
+    const auto light = makeLight(type, {{"radius", "0.5"}});
+    EXPECT_EQ(light->power({{1, 2, 3}, 0}), Rgb(0)) << type;
+    const Emission photon = light->emit({{1, 2, 3}, 0}, Vec4f(0.5f));
+    EXPECT_EQ(photon.power, Rgb(0)) << type;
+    EXPECT_NEAR(glm::length(photon.direction), 1.0f, 1e-6f) << type;
+  }
+}
+
 TEST(Limits, EmptyBoundsTakeNoPower) {
   const BoundingSphere none{{1, 2, 3}, 0};
   for (const LightPlugin* plugin : lightModels()) {
@@ -204,7 +214,7 @@ TEST(Options, AreCheckedAndForeignOnesRefused) {
   EXPECT_THROW(makeLight("rect", {{"size", "[0, 1]"}}), ConfigError);
   EXPECT_THROW(makeLight("disk", {{"radius", "0"}}), ConfigError);
   EXPECT_THROW(makeLight("sphere", {{"radius", "-1"}}), ConfigError);
-  EXPECT_THROW(makeLight("spot", {{"radius", "0.5"}}), ConfigError);
+  EXPECT_THROW(makeLight("spot", {{"radius", "-0.5"}}), ConfigError);
   EXPECT_THROW(makeLight("spot", {{"cone_angle", "181"}}), ConfigError);
   EXPECT_THROW(makeLight("spot", {{"cone_angle", "0"}}), ConfigError);
   EXPECT_THROW(makeLight("spot", {{"intensity", "-1"}}), ConfigError);
@@ -224,6 +234,69 @@ TEST(Options, OnlyWithoutExtentIsDelta) {
     EXPECT_TRUE(light->isGrey()) << plugin->name;
     EXPECT_FALSE(plugin->help.empty());
   }
+  for (const char* type : {"point", "spot"}) {
+    EXPECT_TRUE(makeLight(type, {{"radius", "0"}})->isDelta()) << type;
+    EXPECT_FALSE(makeLight(type, {{"radius", "0.2"}})->isDelta()) << type;
+    EXPECT_TRUE(makeLight(type, {{"radius", "1e-12"}})->isDelta()) << "less than rounding";
+  }
+}
+
+// A soft point or spot lights a point as the sharp one does, from every direction of its body: the
+// mean over a small plate that faces it is I falloff / d^2, and the edge of the cone spreads.
+TEST(SoftLights, KeepTheirIntensity) {
+  const auto mean = [](const Light& light, const Vec3f& p) {
+    const Vec3d normal = glm::normalize(Vec3d(p));
+    double sum = 0;
+    constexpr int n = 200;
+    for (int i = 0; i < n * n; ++i) {
+      const Illumination in = light.illuminate(
+          p, {(static_cast<float>(i % n) + 0.5f) / n, (static_cast<float>(i / n) + 0.5f) / n});
+      sum += static_cast<double>(in.irradiance.g) * glm::dot(Vec3d(in.direction), normal) / (n * n);
+    }
+    return sum;
+  };
+  const auto point =
+      makeLight("point", {{"position", "[0, 0, 0]"}, {"intensity", "3"}, {"radius", "0.5"}});
+  for (const double d : {0.6, 1.0, 7.0, 1000.0}) {
+    const Vec3f p(Vec3d(0.6, 0, -0.8) * d);
+    EXPECT_NEAR(mean(*point, p) / (3 / (d * d)), 1, 3e-4) << d;
+  }
+  EXPECT_EQ(point->illuminate({0.2f, 0, 0}, {0.3f, 0.4f}).irradiance.g, 0.0f) << "dark inside";
+  EXPECT_NEAR(static_cast<double>(point->illuminate({0, 2, 0}, {0.0f, 0.5f}).distance), 1.5, 1e-6);
+
+  const auto spot = [](const char* radius, const char* edge) {
+    return makeLight("spot", {{"position", "[0, 0, 0]"},
+                              {"target", "[0, 0, -1]"},
+                              {"intensity", "3"},
+                              {"cone_angle", "20"},
+                              {"cone_edge", edge},
+                              {"radius", radius}});
+  };
+  const auto at = [](double degrees, double d) {
+    const double theta = degrees * kPi / 180;
+    return Vec3f(d * Vec3d(std::sin(theta), 0, -std::cos(theta)));
+  };
+  const auto hard = spot("0.1", "0"), edged = spot("0.1", "12");
+  for (const double d : {3.0, 500.0}) {
+    EXPECT_NEAR(mean(*hard, at(0, d)) / (3 / (d * d)), 1, 3e-4) << d;
+    EXPECT_NEAR(mean(*hard, at(15, d)) / (3 / (d * d)), 1, 3e-4) << d;
+    EXPECT_EQ(mean(*hard, at(25, d)), 0) << d;
+    // Smoothstep is a half, and odd about it, in the middle of the edge.
+    EXPECT_NEAR(mean(*edged, at(14, d)) / (1.5 / (d * d)), 1, d < 10 ? 0.012 : 1e-3) << d;
+  }
+  // On the edge half of the body is seen in its cone: a narrow penumbra replaces the jump.
+  EXPECT_NEAR(mean(*hard, at(20, 5)) * 25 / 3, 0.5, 0.02);
+  EXPECT_GT(mean(*hard, at(20.5, 5)), 0);
+  EXPECT_GT(mean(*hard, at(19.5, 5)), mean(*hard, at(20.5, 5)));
+  EXPECT_EQ(mean(*hard, at(22, 5)), 0);
+  // A cone far narrower than the body: drawn from the cone, and still I / d^2 on the axis over a
+  // plate that its light fills.
+  const auto narrow = makeLight("spot", {{"position", "[0, 0, 0]"},
+                                         {"target", "[0, 0, -1]"},
+                                         {"cone_angle", "0.5"},
+                                         {"radius", "1"}});
+  const double cone = 2 * kPi * (1 - std::cos(0.5 * kPi / 180));
+  EXPECT_NEAR(mean(*narrow, {0, 0, -5}) / (cone / kPi), 1, 3e-4);
 }
 
 // Irradiance behind a disc's axis and before a ball, at any distance: the textbook's closed forms.

@@ -69,6 +69,13 @@ const ReachCase kReachCases[] = {
     {"disk", "disk", {{"position", "[0, 4, 0]"}, {"radius", "2"}}, {Vec3d(0), 1}, 20},
     {"sphere", "sphere", {{"position", "[4, 0, 0]"}, {"radius", "1"}}, {Vec3d(0), 1}, 12},
     {"point_inside", "point", {{"position", "[0.2, 0, 0]"}}, {Vec3d(0), 1}, 1e300},
+    {"soft_point", "point", {{"position", "[4, 0, 0]"}, {"radius", "0.5"}}, {Vec3d(0), 1}, 12},
+    {"soft_spot", "spot", {{"position", "[4, 0, 0]"}, {"radius", "0.5"}}, {Vec3d(0), 1}, 3},
+    {"soft_spot_that_misses",
+     "spot",
+     {{"position", "[0, 0, 10]"}, {"radius", "0.5"}},
+     {Vec3d(8, 0, 0), 1},
+     1},
     {"sphere_around", "sphere", {{"position", "[0, 0, 2]"}, {"radius", "2"}}, {Vec3d(0), 1}, 20},
 };
 

@@ -14,7 +14,7 @@ namespace {
 class Speck final : public render::Integrator {
  public:
   Speck(const Vec3d& at, double size) : m_at(at), m_size(size) {}
-  render::RayRadiance radiance(const Vec3d& origin, const Vec3f& direction, Rng&,
+  render::RayRadiance radiance(const Vec3d& origin, const Vec3f& direction, transport::Moment, Rng&,
                                render::IntegratorCounters&) const override {
     const Vec3d d = glm::normalize(Vec3d(direction)), to = m_at - origin;
     render::RayRadiance r;

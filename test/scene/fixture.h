@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <cstring>
 #include <string>
 
 #include "photosphere/core/error.h"
@@ -55,6 +56,10 @@ std::string complaint(const Action& action, ExitCode code = ExitCode::usage) {
     return error.what();
   }
   return {};
+}
+
+inline bool sameBits(const std::vector<Rgb>& a, const std::vector<Rgb>& b) {
+  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(Rgb)) == 0;
 }
 
 inline bool contains(const std::string& text, const std::string& part) {

@@ -1,7 +1,6 @@
 // Photon maps through the scene file: passes, limits, memory, what is reported.
 
 #include <cmath>
-#include <cstring>
 
 #include "fixture.h"
 #include "photosphere/core/parallel.h"
@@ -46,10 +45,6 @@ double relativeL2(const std::vector<Rgb>& image, const std::vector<Rgb>& referen
     norm += std::pow(static_cast<double>(reference[i].y), 2);
   }
   return std::sqrt(difference / norm);
-}
-
-bool sameBits(const std::vector<Rgb>& a, const std::vector<Rgb>& b) {
-  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(Rgb)) == 0;
 }
 
 TEST_F(PhotonMapScene, AgreesWithThePhotosphere) {

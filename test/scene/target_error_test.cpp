@@ -1,7 +1,6 @@
 // Frames that go on until their estimated error is small enough, and what the estimate is worth.
 
 #include <cmath>
-#include <cstring>
 
 #include "fixture.h"
 #include "photosphere/core/parallel.h"
@@ -24,10 +23,6 @@ double relativeError(const std::vector<Rgb>& image, const std::vector<Rgb>& refe
       sum += d * d / (r * r + 0.01 * mean * mean);
     }
   return std::sqrt(sum / (3.0 * static_cast<double>(image.size())));
-}
-
-bool sameBits(const std::vector<Rgb>& a, const std::vector<Rgb>& b) {
-  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(Rgb)) == 0;
 }
 
 // A made-up frame of 80 x 50 pixels whose noise and bias are known.

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "photosphere/cameras/camera.h"
+#include "photosphere/cameras/moving_camera.h"
 #include "photosphere/lights/light.h"
 #include "photosphere/render/integrator.h"
 
@@ -36,6 +37,7 @@ struct FrameOptions {
   Lens lens;                 ///< of a perspective camera
   bool moving = false;       ///< something moves while the shutter is open
   transport::Shutter shutter;
+  const cameras::MovingCamera* motion = nullptr;  ///< the camera over the shutter, where it moves
 };
 
 /// Layers of a frame over its crop, row by row from the top, RGB interleaved as Rgb.

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "photosphere/cameras/camera.h"
+#include "photosphere/cameras/moving_camera.h"
 #include "photosphere/core/effects.h"
 #include "photosphere/core/rng.h"
 #include "photosphere/estimators/light_field.h"
@@ -46,7 +47,9 @@ struct FrameSetup {
   Box3d worldBounds;  ///< of everything that can scatter [scene units]; empty without smoke
   std::unique_ptr<transport::Medium> medium;  ///< never null; may be empty
   transport::LightList lights;
-  std::unique_ptr<cameras::Camera> camera;
+  std::unique_ptr<cameras::Camera> camera;  ///< at the frame
+  /// The camera over the shutter; null where it stands still or that is not simulated.
+  std::unique_ptr<cameras::MovingCamera> motion;
   estimators::View view;
   render::Lens lens;  ///< of radius 0 where depth of field is off
   /// Local space [m], in the order in which a point grid gives them back; carrier = "particles"

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "photosphere/core/param.h"
+#include "photosphere/scene/keys.h"
 
 namespace photosphere::scene {
 
@@ -20,6 +21,7 @@ struct VolumeEntry {
   ParamValues phaseValues;                  ///< that plug-in's rows
   bool emits = false;                       ///< `emission` was given
   ParamValues emission;                     ///< emissionParams()
+  Tracks keys, phaseKeys, emissionKeys;     ///< of the three sets of values
   std::string where;  ///< "scene.toml:12: [[volume]] 0", begins messages about it
 };
 
@@ -27,6 +29,7 @@ struct VolumeEntry {
 struct LightEntry {
   std::string type;    ///< light plug-in
   ParamValues values;  ///< lights::lightParams() and the plug-in's rows
+  Tracks keys;
   std::string where;
 };
 
@@ -38,6 +41,8 @@ struct SceneFile {
   std::string cameraType = "perspective";
   ParamValues camera;  ///< cameras::cameraParams() and the plug-in's rows
   std::string cameraWhere;
+  Tracks cameraKeys;
+  Tracks shot;  ///< of `camera.file`: `matrix` and, where the file says so, kShotFov
   std::vector<VolumeEntry> volumes;
   std::vector<LightEntry> lights;
   ParamValues estimator, effects, render, output;
@@ -46,11 +51,20 @@ struct SceneFile {
 
   /// An absolute path as it is, a relative one below `folder`; an empty one stays empty.
   std::string resolvePath(const std::string& written) const;
-  /// True when neither `position` nor `matrix` places the camera: it then frames the smoke.
+  /// True when neither `position`, `matrix` nor `file` places the camera: it then frames the smoke.
   bool framesSmoke() const;
   /// Hash of all that pixels depend on, but not of the caches' content, as 16 hex digits.
   std::string hash() const;
 };
+
+/// Key of SceneFile::shot: vertical field of view [degrees].
+inline constexpr std::string_view kShotFov = "vertical fov";
+
+/// The scene as it stands at a time [frames]: keyed values are what they are then. The keys stay,
+/// so that the result can be asked for other times. @throws ConfigError
+SceneFile sceneAt(const SceneFile& scene, double time);
+/// The camera's values alone; of a `.chan` file as `matrix` and `fov`, for the scene's resolution.
+ParamValues cameraAt(const SceneFile& scene, double time);
 
 /// Rows of the tables that belong to no plug-in: for --help and `photosphere list`.
 std::span<const Param> sceneParams();
