@@ -68,6 +68,7 @@ class EffectPlan {
 
     // In the order of what leaving them out saves.
     Decision multiple = multipleScattering();
+    m_multiple = multiple.on;
     dropFaintLamps(lamps);
     Decision emission = this->emission();
     Decision single = singleScattering();
@@ -183,6 +184,11 @@ class EffectPlan {
             0.0};
   }
 
+  // With what of it is simulated.
+  double adds(const LampBound& lamp) const {
+    return lamp.single + lamp.background + (m_multiple ? lamp.multiple : 0.0);
+  }
+
   // Lamps beside which others are so bright that they may be left out.
   void dropFaintLamps(Decision& lamps) {
     if (m_forOtherViews || isOn("single_scattering") || isOn("multiple_scattering")) return;
@@ -191,8 +197,8 @@ class EffectPlan {
     while (!m_setup.lights.empty()) {
       std::size_t least = 0;
       for (std::size_t i = 1; i < m_lamps.size(); ++i)
-        if (m_lamps[i].all() < m_lamps[least].all()) least = i;
-      const std::optional<double> bound = afford(m_lamps[least].all());
+        if (adds(m_lamps[i]) < adds(m_lamps[least])) least = i;
+      const std::optional<double> bound = afford(adds(m_lamps[least]));
       if (!bound) break;
       sum += *bound;
       faint.push_back(fmt::format("'{}'", m_setup.lights[least]->name()));
@@ -237,7 +243,7 @@ class EffectPlan {
     Decision decision = unlessNever("emission", glows() ? "" : darkEmission(), "a volume emits");
     if (!decision.on || !glows() || isOn("emission") || m_forOtherViews) return decision;
     const std::optional<double> bound =
-        afford(m_bounds->glow() + (m_scatters ? m_bounds->scatteredGlow() : 0.0));
+        afford(m_bounds->glow() + (m_multiple ? m_bounds->scatteredGlow() : 0.0));
     if (!bound) return decision;
     const transport::Shutter shutter = m_setup.medium->shutter();
     // Nothing is left that births photons or fills bricks.
@@ -258,7 +264,7 @@ class EffectPlan {
     if (!decision.on || isOn("shadows")) return decision;
     double most = 0;
     for (const LampBound& lamp : m_lamps)
-      most += (lamp.single + lamp.multiple) * lamp.shadow;
+      most += adds({lamp.single, lamp.multiple}) * lamp.shadow;
     if (const std::optional<double> bound = afford(most))
       return {false, "the smoke is thin: its shadows take away " + share(*bound), bound};
     return decision;
@@ -397,6 +403,7 @@ class EffectPlan {
   bool m_forOtherViews;  // the light is kept for cameras that are not known
   bool m_single;         // light scattered twice is nobody's to estimate
   bool m_scatters = false;
+  bool m_multiple = true;
   std::size_t m_allLamps = 0;
   std::optional<LightBounds> m_bounds;  // nothing without smoke
   std::vector<LampBound> m_lamps;       // as m_setup.lights

@@ -81,7 +81,6 @@ struct LampBound {
   double single = 0, multiple = 0;
   double background = 0;  ///< seen directly
   double shadow = 0;      ///< part of its light that smoke on the way takes away, 1 - T
-  double all() const { return single + multiple + background; }
 };
 
 /// Bounds of a frame's light. Immutable.
