@@ -275,8 +275,7 @@ class EffectPlan {
     if (isOff("motion_blur")) return {false, "off in the scene"};
     const transport::Medium& medium = *m_setup.medium;
     if (!medium.isMoving() && !m_setup.motion)
-      return unlessNever("motion_blur", "no volume has a velocity, and the camera stands still",
-                         "");
+      return {false, "no volume has a velocity, and the camera stands still", 0.0};
     double pixels = 0;
     if (medium.isMoving())
       pixels += medium.displacement() / m_setup.space.metersPerUnit * pixelsPerUnit();
