@@ -48,7 +48,11 @@ void traceVoxels(const Medium& medium, const transport::LightList& lights, const
                  const transport::TraceOptions& options, transport::TraceStatistics& statistics,
                  LightField& field) {
   const double edge = field.layout.lightVoxel * medium.voxelEdge();
-  field.lattice = transport::SupportLattice(medium, edge, marginOf(field.layout, edge));
+  std::function<bool(const Vec3d&)> seen;
+  // Two blurs and a reading between voxels; three radii, as a wider kernel may ask again.
+  const double reach = 3.0 * field.layout.radius + 3.0 * edge;
+  if (!view.planes.empty()) seen = [&](const Vec3d& p) { return view.sees(p, reach); };
+  field.lattice = transport::SupportLattice(medium, edge, marginOf(field.layout, edge), seen);
   FixedSums sums;
   sums.sums.assign(field.lattice.size() * static_cast<std::size_t>(field.layout.valuesPerCarrier()),
                    0);

@@ -103,6 +103,7 @@ estimators::LightField lightField(const SceneFile& scene, const RenderRequest& r
   transport::TraceOptions options;
   options.photons = setup.photons;
   options.key = setup.key;
+  options.guide = setup.guide.get();
   transport::TraceStatistics traced;
   estimators::LightField field = estimators::traceLightField(
       *setup.medium, setup.lights, setup.layout, setup.view, setup.particles, options, traced);

@@ -28,6 +28,7 @@ transport::TraceOptions traceOptions(const FrameSetup& setup, int pass) {
   options.firstPhoton = each * static_cast<std::uint64_t>(pass);
   options.photonCount = each;
   options.key = setup.key;
+  options.guide = setup.guide.get();
   return options;
 }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "aim.h"
 #include "frame_batches.h"
 #include "light_stage.h"
 #include "photosphere/core/error.h"
@@ -113,6 +114,9 @@ FrameResult renderScene(const SceneFile& written, std::int64_t frame,
   result.estimator = scene.estimator.text("type");
   result.seed = request.seed.value_or(scene.scene.integer("seed"));
 
+  const Stopwatch aiming;
+  aimLight(scene, crop, setup);
+  result.statistics.seconds.trace += aiming.seconds();
   checkMemory(setup, storesLight(scene, setup) && scene.estimator.text("cache").empty());
   renderBatches(scene, request, crop, total, setup, result);
   result.notes = setup.notes;

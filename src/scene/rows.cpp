@@ -258,6 +258,14 @@ std::span<const Param> estimatorParams() {
                "all and needs none)",
        .min = 1,
        .max = 32768},
+      {.name = "importance",
+       .type = ParamType::text,
+       .unit = "",
+       .defaultText = "auto",
+       .help = "photons where the picture gains from them, found by paths from the camera; auto = "
+               "where less than half of the smoke is in the frame, or less than a quarter of the "
+               "lamps' light meets smoke",
+       .choices = "auto|on|off"},
       {.name = "light_voxel",
        .unit = "",
        .defaultText = "2.0",

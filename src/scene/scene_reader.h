@@ -12,6 +12,13 @@ std::vector<Param> joinRows(std::span<const Param> common, std::span<const Param
 /// Text as a quoted TOML string.
 std::string tomlText(const std::string& text);
 
+/// A node as text, or as a value that ParamValues checks against its row.
+/// @param place  begins messages @throws ConfigError
+std::string textOf(const toml::node& node, std::string_view key, const std::string& place);
+ParamValue valueOf(const toml::node& node, std::string_view key, const std::string& place);
+
+bool hasRow(const ParamValues& values, std::string_view key);
+
 class SceneReader {
  public:
   SceneReader(const TomlText& text, SceneFile& scene) : m_text(text), m_scene(scene) {}

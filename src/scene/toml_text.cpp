@@ -96,8 +96,12 @@ void applySet(toml::table& root, const std::string& set, TomlText& out) {
 
 std::string TomlText::where(const toml::node& node, const std::string& dotted,
                             const std::string& table) const {
-  const auto place = sets.find(dotted);
-  if (place != sets.end()) return fmt::format("--set {}: [{}]", place->second, table);
+  // What the user typed may be the node itself or a table or array that it lies in.
+  for (std::size_t end = dotted.size(); end != std::string::npos && end > 0;
+       end = dotted.rfind('.', end - 1)) {
+    const auto place = sets.find(dotted.substr(0, end));
+    if (place != sets.end()) return fmt::format("--set {}: [{}]", place->second, table);
+  }
   if (node.source().begin.line == 0) return fmt::format("{}: [{}]", name, table);
   return fmt::format("{}:{}: [{}]", name, node.source().begin.line, table);
 }

@@ -1,6 +1,7 @@
 #include "photosphere/transport/photon_tracer.h"
 
 #include <algorithm>
+#include <optional>
 
 #include "photosphere/core/parallel.h"
 #include "photosphere/core/progress.h"
@@ -47,7 +48,13 @@ struct BirthSequence {
 // Chooses a source in proportion to its power: the lamps, then the medium's emission.
 class SourceChoice {
  public:
-  SourceChoice(const Medium& medium, const LightList& lights) {
+  /// @param guide  gives the probabilities in place of the powers; may be null
+  SourceChoice(const Medium& medium, const LightList& lights, const PhotonGuide* guide = nullptr) {
+    if (guide) {
+      for (const double p : guide->sources())
+        m_cumulative.push_back(m_total += p);
+      return;
+    }
     const lights::BoundingSphere bounds = boundingSphere(medium);
     double sum = 0;
     for (const auto& light : lights) {
@@ -134,12 +141,13 @@ class FlightTimes {
 // Births of a frame's photons.
 class Births {
  public:
-  Births(const Medium& medium, const LightList& lights, RandomKey key)
+  Births(const Medium& medium, const LightList& lights, const TraceOptions& options)
       : m_medium(medium),
         m_lights(lights),
+        m_guide(options.guide),
         m_bounds(boundingSphere(medium)),
-        m_choice(medium, lights),
-        m_sequence(key) {}
+        m_choice(medium, lights, options.guide),
+        m_sequence(options.key) {}
   bool dark() const { return m_choice.dark(); }
 
   // The first flight of a photon, clipped to the medium's bounds; of length 0 where it misses them.
@@ -148,31 +156,47 @@ class Births {
     const std::size_t source = m_choice.choose(m_sequence(photon, 0));
     Flight flight;
     flight.photon = photon;
+    Place place{m_sequence.fine(photon, 1), m_sequence(photon, 2)};
+    float weight = 1.0f;
+    if (m_guide) {
+      const PhotonGuide::Drawn drawn =
+          m_guide->draw(source, {static_cast<float>(place.first), place.second});
+      place = {static_cast<double>(drawn.u.x), drawn.u.y};
+      weight = drawn.weight;
+    }
     if (source == m_lights.size())
-      bornInSmoke(photon, rng, flight, when);
+      bornInSmoke(photon, place, rng, flight, when);
     else
-      sentByLamp(source, photon, flight);
-    flight.power /= static_cast<float>(m_choice.probability(source));
+      sentByLamp(source, photon, place, flight);
+    flight.power *= weight / static_cast<float>(m_choice.probability(source));
     return flight;
   }
 
  private:
+  // The two numbers that a guide may choose.
+  struct Place {
+    double first;
+    float second;
+  };
+
   template <class When>
-  void bornInSmoke(std::uint64_t photon, Rng& rng, Flight& flight, When when) const {
+  void bornInSmoke(std::uint64_t photon, const Place& place, Rng& rng, Flight& flight,
+                   When when) const {
     const Vec2f u = rng.uniform2();
-    const Emission::Birth birth =
-        m_medium.emission()->birth(m_sequence.fine(photon, 1), Vec3f(u, rng.uniform()));
+    const Emission::Birth birth = m_medium.emission()->birth(place.first, Vec3f(u, rng.uniform()));
     flight.light = kEmittedBySmoke;
     flight.power = birth.power;
     flight.origin = m_medium.moved(birth.volume, birth.origin, when);
-    flight.direction = sampleSphere(Vec2f(m_sequence(photon, 2), m_sequence(photon, 3)));
+    flight.direction = sampleSphere(Vec2f(place.second, m_sequence(photon, 3)));
     flight.length = exitDistance(m_medium, flight.origin, flight.direction);
   }
 
-  void sentByLamp(std::size_t lamp, std::uint64_t photon, Flight& flight) const {
-    const lights::Emission birth =
-        m_lights[lamp]->emit(m_bounds, Vec4f(m_sequence(photon, 1), m_sequence(photon, 2),
-                                             m_sequence(photon, 3), m_sequence(photon, 4)));
+  void sentByLamp(std::size_t lamp, std::uint64_t photon, const Place& place,
+                  Flight& flight) const {
+    // The same 24 bits as the sequence's own floats.
+    const lights::Emission birth = m_lights[lamp]->emit(
+        m_bounds,
+        Vec4f(rounded(place.first), place.second, m_sequence(photon, 3), m_sequence(photon, 4)));
     flight.light = static_cast<std::uint32_t>(lamp);
     flight.power = birth.power;
     const Segment inside = clipToMedium(m_medium, birth.origin, birth.direction,
@@ -182,8 +206,13 @@ class Births {
     flight.length = inside.length;
   }
 
+  static float rounded(double u) {
+    return static_cast<float>(static_cast<std::uint32_t>(u * 0x1p24)) * 0x1p-24f;
+  }
+
   const Medium& m_medium;
   const LightList& m_lights;
+  const PhotonGuide* m_guide;
   lights::BoundingSphere m_bounds;
   SourceChoice m_choice;
   BirthSequence m_sequence;
@@ -215,48 +244,123 @@ void handOn(const Medium& medium, const Flight& flight, Batch& batch, Moment whe
   }
 }
 
-// Follows one photon from its entry into the bounds to its end.
-template <class When>
-void follow(const Medium& medium, Flight flight, Rng& rng, Batch& batch, TraceStatistics& stats,
-            TrackingCounters& counters, When when) {
-  while (true) {
-    const Collision hit = sampleCollision(medium, flight.origin, flight.direction, flight.length,
-                                          rng, counters, when);
-    if (hit.happened()) flight.length = hit.distance;
-    flight.extinctionAtEnd = hit.extinction;
-    handOn(medium, flight, batch, when);
-    ++stats.flights;
-    if (!hit.happened()) {
-      stats.escaped += Vec3d(flight.power);
-      return;
+// Keeps the weights of photons near those that the picture wants: light ones play roulette, heavy
+// ones split.
+class WeightWindow {
+ public:
+  /// @param whole  power of a photon that is not steered [W]
+  WeightWindow(const PhotonGuide& guide, double whole)
+      : m_guide(guide), m_inverseWhole(static_cast<float>(1.0 / whole)) {}
+
+  /// @return how many photons go on in place of one, each of the power that is left in `power`
+  int operator()(const Vec3f& p, Rgb& power, Rng& rng) const {
+    const float weight = maxComponent(power) * m_inverseWhole;
+    const float wanted = m_guide.wantedWeight(p);
+    if (weight < 0.5f * wanted) {
+      if (!(rng.uniform() * wanted < weight)) return 0;
+      power *= wanted / weight;
+      return 1;
     }
+    if (!(weight > 2.0f * wanted)) return 1;
+    const float copies = glm::min(std::ceil(weight / wanted), kMostCopies);
+    power /= copies;
+    return static_cast<int>(copies);
+  }
+
+ private:
+  static constexpr float kMostCopies = 64.0f;
+  const PhotonGuide& m_guide;
+  float m_inverseWhole;
+};
+
+// Follows photons from their entry into the bounds to their end.
+template <class When>
+class Follower {
+ public:
+  /// @param window  null where photons are not steered
+  Follower(const Medium& medium, const WeightWindow* window, Batch& batch, TraceStatistics& stats)
+      : m_medium(medium), m_window(window), m_batch(batch), m_stats(stats) {}
+  ~Follower() { m_stats.majorantViolations += m_counters.majorantViolations; }
+  Follower(const Follower&) = delete;
+  Follower& operator=(const Follower&) = delete;
+
+  void follow(Flight flight, Rng& rng, When when) {
+    one(flight, rng, when);
+    // Those that split off on the way.
+    while (!m_waiting.empty()) {
+      flight = m_waiting.back();
+      m_waiting.pop_back();
+      one(flight, rng, when);
+    }
+  }
+
+ private:
+  void one(Flight flight, Rng& rng, When when) {
+    while (true) {
+      const Collision hit = sampleCollision(m_medium, flight.origin, flight.direction,
+                                            flight.length, rng, m_counters, when);
+      if (hit.happened()) flight.length = hit.distance;
+      flight.extinctionAtEnd = hit.extinction;
+      handOn(m_medium, flight, m_batch, when);
+      ++m_stats.flights;
+      if (!hit.happened()) {
+        m_stats.escaped += Vec3d(flight.power);
+        return;
+      }
+      const Vec3d before(flight.power);
+      const Vec3f point = flight.origin + flight.direction * hit.distance;
+      int copies = 1;
+      if (m_window) {
+        copies = (*m_window)(point, flight.power, rng);
+        m_stats.absorbed += before - static_cast<double>(copies) * Vec3d(flight.power);
+      }
+      for (; copies > 1; --copies) {
+        Flight twin = flight;
+        if (scatterAt(twin, point, rng, when)) {
+          twin.ordinal += static_cast<std::uint32_t>(copies) << 20;
+          m_waiting.push_back(twin);
+        }
+      }
+      if (copies == 0 || !scatterAt(flight, point, rng, when)) return;
+    }
+  }
+
+  // One collision. @return whether the photon goes on
+  bool scatterAt(Flight& flight, const Vec3f& point, Rng& rng, When when) {
     const Vec3d before(flight.power);
-    const Vec3f point = flight.origin + flight.direction * hit.distance;
-    const ScatterEvent event = scatter(medium, point, flight.direction, flight.power, rng, when);
+    const ScatterEvent event = scatter(m_medium, point, flight.direction, flight.power, rng, when);
     if (!event.survived) {
-      stats.absorbed += before;
-      return;
+      m_stats.absorbed += before;
+      return false;
     }
     flight.power *= event.weight;
-    stats.absorbed += before - Vec3d(flight.power);
-    stats.scatterings += event.scattered ? 1 : 0;
+    m_stats.absorbed += before - Vec3d(flight.power);
+    m_stats.scatterings += event.scattered ? 1 : 0;
     flight.scatterings += event.scattered ? 1 : 0;
     ++flight.ordinal;
     if (flight.scatterings > kLongPath) {
       const Vec3d whole(flight.power);
       if (!(rng.uniform() < 0.999f)) {
-        stats.cappedPower += whole;
-        ++stats.capped;
-        return;
+        m_stats.cappedPower += whole;
+        ++m_stats.capped;
+        return false;
       }
       flight.power *= 1.0f / 0.999f;
-      stats.cappedPower += whole - Vec3d(flight.power);
+      m_stats.cappedPower += whole - Vec3d(flight.power);
     }
     flight.origin = point;
     flight.direction = event.direction;
-    flight.length = exitDistance(medium, point, flight.direction);
+    flight.length = exitDistance(m_medium, point, flight.direction);
+    return true;
   }
-}
+
+  const Medium& m_medium;
+  const WeightWindow* m_window;
+  Batch& m_batch;
+  TraceStatistics& m_stats;
+  TrackingCounters m_counters;
+  std::vector<Flight> m_waiting;
+};
 
 }  // namespace
 
@@ -274,9 +378,10 @@ namespace {
 // The photons of one chunk: [begin, end).
 template <class When>
 void traceChunk(const Medium& medium, const Births& births, const FlightTimes& times, RandomKey key,
-                std::uint64_t begin, std::uint64_t end, FlightSink& sink, TraceStatistics& stats) {
-  TrackingCounters counters;
+                const WeightWindow* window, std::uint64_t begin, std::uint64_t end,
+                FlightSink& sink, TraceStatistics& stats) {
   Batch batch(sink);
+  Follower<When> follower(medium, window, batch, stats);
   for (std::uint64_t photon = begin; photon < end; ++photon) {
     Rng rng(key, RandomStream::photon, photon);
     When when;
@@ -288,11 +393,10 @@ void traceChunk(const Medium& medium, const Births& births, const FlightTimes& t
     stats.emitted += Vec3d(flight.power);
     // What is born at the very edge still leaves from inside.
     if (flight.length > 0.0f || born)
-      follow(medium, flight, rng, batch, stats, counters, when);
+      follower.follow(flight, rng, when);
     else
       stats.missed += Vec3d(flight.power);
   }
-  stats.majorantViolations += counters.majorantViolations;
 }
 
 }  // namespace
@@ -301,8 +405,10 @@ TraceStatistics tracePhotons(const Medium& medium, const LightList& lights,
                              const TraceOptions& options, FlightSink& sink) {
   TraceStatistics total;
   if (medium.bounds().empty()) return total;
-  const Births births(medium, lights, options.key);
+  const Births births(medium, lights, options);
   if (births.dark()) return total;
+  std::optional<WeightWindow> window;
+  if (options.guide) window.emplace(*options.guide, SourceChoice(medium, lights).total());
   const FlightTimes times(medium.shutter(), options.key);
   const auto trace = medium.isMoving() ? traceChunk<Moment> : traceChunk<Still>;
   const std::uint64_t first = std::min(options.firstPhoton, options.photons);
@@ -315,7 +421,8 @@ TraceStatistics tracePhotons(const Medium& medium, const LightList& lights,
     for (std::size_t chunk = beginChunk; chunk < endChunk; ++chunk) {
       const std::uint64_t begin = first + chunk * kPhotonsPerChunk;
       const std::uint64_t end = std::min(begin + kPhotonsPerChunk, first + count);
-      trace(medium, births, times, options.key, begin, end, sink, parts[chunk]);
+      trace(medium, births, times, options.key, window ? &*window : nullptr, begin, end, sink,
+            parts[chunk]);
       progress.add(end - begin);
     }
   });

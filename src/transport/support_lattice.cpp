@@ -97,7 +97,8 @@ void markSupport(const Medium& medium, const Vec3d& origin, double edge, Marks& 
 
 }  // namespace
 
-SupportLattice::SupportLattice(const Medium& medium, double edge, int margin)
+SupportLattice::SupportLattice(const Medium& medium, double edge, int margin,
+                               const std::function<bool(const Vec3d&)>& keep)
     : m_edge(edge), m_inverseEdge(static_cast<float>(1.0 / edge)) {
   if (medium.bounds().empty()) return;
   // One voxel beyond the margin on every side, so that a flight's neighbours exist in the table.
@@ -123,7 +124,9 @@ SupportLattice::SupportLattice(const Medium& medium, double edge, int margin)
         for (int x = -reach; x <= reach; ++x)
           dilated.mark(v + Vec3i(x, y, z));
   });
-  dilated.forEach([&](const Vec3i& v) { m_voxels.push_back(v); });
+  dilated.forEach([&](const Vec3i& v) {
+    if (!keep || keep(m_origin + (Vec3d(v) + 0.5) * m_edge)) m_voxels.push_back(v);
+  });
   number();
 }
 

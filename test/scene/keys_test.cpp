@@ -147,6 +147,8 @@ TEST(Keys, ComplaintsNameFileLineAndKey) {
   EXPECT_TRUE(
       contains(complaint([] { sceneOf(kLit, {"light.0.size=[{ frame = 1, value = [1, 1] }]"}); }),
                "'size' is an option of light type rect"));
+  EXPECT_TRUE(contains(complaint([] { sceneOf(kLit, {"camera.up=[{frame=1,value=[1]}]"}); }),
+                       "--set camera.up=[{frame=1,value=[1]}]: [camera]: 'up' must be"));
   EXPECT_TRUE(contains(
       complaint([] { sceneOf(kLit, {"camera.fov=[{frame=2,value=3},{frame=1,value=3}]"}); }),
       "[camera]: the keys of 'fov'"));
@@ -334,6 +336,18 @@ TEST_F(ShotTest, FramesAreThoseOfTheirTime) {
   EXPECT_NEAR(moving.statistics.imageMean, plain.statistics.imageMean,
               0.03 * plain.statistics.imageMean);
   EXPECT_EQ(moving.ndcFromWorld, plain.ndcFromWorld) << "matrices are those at the frame";
+}
+
+// Light is kept with the lamps of its frame.
+TEST_F(ShotTest, ALightCacheIsOfItsFrame) {
+  std::vector<std::string> sets = {
+      "light.0.intensity=[{ frame = 1, value = 50 }, { frame = 5, value = 200 }]",
+      "estimator.photons=2000", "camera.resolution=[8, 8]"};
+  const std::string path = (m_folder / "light.vdb").string();
+  traceScene(scene(sets), 3, path);
+  sets.push_back("estimator.cache=" + path);
+  EXPECT_EQ(complaint([&] { renderScene(scene(sets), 3); }), "");
+  EXPECT_NE(complaint([&] { renderScene(scene(sets), 4); }, ExitCode::inputInvalid), "");
 }
 
 }  // namespace

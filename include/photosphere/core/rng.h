@@ -17,6 +17,7 @@ enum class RandomStream : std::uint32_t {
   camera = 3,
   particles = 4,
   merge = 5,
+  importance = 6,
   test = 99,
 };
 

@@ -1,6 +1,8 @@
 #pragma once
 // What every estimator answers: how much light is scattered at a point toward the eye.
 
+#include <vector>
+
 #include "photosphere/transport/medium.h"
 
 namespace photosphere::estimators {
@@ -32,6 +34,16 @@ struct View {
   bool hasEye = true;
   Vec3d eye{0.0};             ///< position [m], where hasEye
   Vec3f direction{0, 0, -1};  ///< unit view direction, used where there is no eye
+  /// Planes (unit normal inward, offset) around all that will be looked at, local space [m]: light
+  /// beyond them need not be stored. Empty = everywhere.
+  std::vector<glm::dvec4> planes;
+
+  /// Whether a ball may be looked at.
+  bool sees(const Vec3d& center, double radius) const {
+    for (const glm::dvec4& plane : planes)
+      if (glm::dot(plane, glm::dvec4(center, 1.0)) < -radius) return false;
+    return true;
+  }
 
   /// Unit propagation direction from a point toward the eye.
   Vec3f toEye(const Vec3f& p) const {

@@ -10,11 +10,10 @@
 
 #include "photosphere/core/rng.h"
 #include "photosphere/lights/light.h"
+#include "photosphere/transport/importance.h"
 #include "photosphere/transport/medium.h"
 
 namespace photosphere::transport {
-
-using LightList = std::vector<std::unique_ptr<lights::Light>>;
 
 /// Stands for a lamp's index where the smoke's own emission is the source.
 inline constexpr std::uint32_t kEmittedBySmoke = ~0u;
@@ -47,9 +46,13 @@ struct TraceOptions {
   std::uint64_t firstPhoton = 0;      ///< of this shard
   std::uint64_t photonCount = ~0ull;  ///< of this shard; clipped to the frame's
   RandomKey key;
+  /// Steers births and flights; nullptr = photons of equal power. Must outlive the trace.
+  const PhotonGuide* guide = nullptr;
 };
 
-/// What became of the photons. Powers are per channel [W] of all the frame's light.
+/// What became of the photons. Powers are per channel [W] of all the frame's light. Where photons
+/// are steered, what was emitted is an estimate too, and `absorbed` holds what roulette takes less
+/// what it gives.
 struct TraceStatistics {
   std::uint64_t photons = 0;  ///< emitted in this run
   std::uint64_t born = 0;     ///< of these, by the smoke itself

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "photosphere/transport/medium.h"
@@ -18,8 +19,10 @@ class SupportLattice {
   SupportLattice() = default;
   /// @param edge     voxel edge [m]
   /// @param margin   dilation in voxels, >= 0, along each axis
+  /// @param keep     whether a voxel about that point is wanted; empty = all are
   /// @throws MemoryError when the brick table alone would pass 4 GiB
-  SupportLattice(const Medium& medium, double edge, int margin);
+  SupportLattice(const Medium& medium, double edge, int margin,
+                 const std::function<bool(const Vec3d&)>& keep = {});
   /// Rebuilds a lattice from its placement and the coordinates of its active voxels, in their
   /// order.
   SupportLattice(const Vec3d& origin, double edge, const Vec3i& bricks,
