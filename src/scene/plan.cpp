@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "effect_plan.h"
+#include "aim.h"
 #include "estimator_options.h"
 #include "layer_renderer.h"
 #include "light_stage.h"
@@ -152,6 +152,7 @@ FramePlan planScene(const SceneFile& scene, std::int64_t frame, const RenderRequ
   options.cacheFrame = request.cacheFrame;
   const Stopwatch watch;
   FrameSetup setup = setUpFrame(scene, frame, options);
+  aimLight(scene, {Vec2i(0), setup.camera->resolution()}, setup);
   const double setUp = watch.seconds();
   const bool stored = storesLight(scene, setup);
   FramePlan plan;
