@@ -62,15 +62,24 @@ std::unique_ptr<ThreadLimit> apply(const GeneralOptions& options) {
 }
 
 void addFrameOptions(CLI::App& app, FrameOptions& options) {
+  addFrameRange(app, options);
+  addOutputFrameOptions(app, options);
+}
+
+void addFrameRange(CLI::App& app, FrameOptions& options) {
   const char* group = "Frames";
   app.add_option("--frames", options.frames, "Frames: 7, 1-100, 1-100x2, 1-5y2, 3,4,10-20x2, 5-1")
       ->type_name("RANGE")
       ->group(group);
-  app.add_flag("--skip-existing", options.skipExisting,
-               "Leave out frames whose output opens and is complete")
-      ->group(group);
   app.add_flag("--keep-going", options.keepGoing,
                "After a failed frame go on with the others, then exit 8")
+      ->group(group);
+}
+
+void addOutputFrameOptions(CLI::App& app, FrameOptions& options) {
+  const char* group = "Frames";
+  app.add_flag("--skip-existing", options.skipExisting,
+               "Leave out frames whose output opens and is complete")
       ->group(group);
   app.add_flag("--dry-run", options.dryRun, "Print what would be done, and do nothing")
       ->group(group);

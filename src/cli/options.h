@@ -37,6 +37,10 @@ struct FrameOptions {
 };
 
 void addFrameOptions(CLI::App& app, FrameOptions& options);
+/// Which frames, and what a failed one does: for commands that write none, too.
+void addFrameRange(CLI::App& app, FrameOptions& options);
+/// The others: what happens to the outputs.
+void addOutputFrameOptions(CLI::App& app, FrameOptions& options);
 
 /// Three numbers, as `1,-2,0.5` or `[1, -2, 0.5]`. @throws ConfigError naming the option
 Vec3d parseVec3(std::string_view option, const std::string& text);

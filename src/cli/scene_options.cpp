@@ -65,16 +65,21 @@ void refuseUnserved(const SceneOptions& options) {
 }  // namespace
 
 void addSceneOptions(CLI::App& app, SceneOptions& options) {
-  addScenePaths(app, options);
+  addPlanOptions(app, options);
   app.add_option("--stats", options.stats,
                  "Statistics as JSON: an object a frame with #### in the path, else an array when "
                  "there are several frames")
       ->type_name("FILE.json");
-  app.add_flag("--allow-stale", options.allowStale,
-               "Use a light cache that was made for another medium or other lights");
   app.add_option("--resume", options.resume, "auto, never or require (not served yet)")
       ->check(CLI::IsMember(std::vector<std::string>{"auto", "never", "require"}).description(""))
       ->type_name("WHEN");
+  addOutputFrameOptions(app, options.frames);
+}
+
+void addPlanOptions(CLI::App& app, SceneOptions& options) {
+  addScenePaths(app, options);
+  app.add_flag("--allow-stale", options.allowStale,
+               "Use a light cache that was made for another medium or other lights");
   app.add_option("--cache-offset", options.cacheOffset,
                  "Frame of the caches minus frame of the picture [0]")
       ->type_name("N")
@@ -87,7 +92,7 @@ void addSceneOptions(CLI::App& app, SceneOptions& options) {
       ->type_name("HOW")
       ->check(CLI::IsMember(names).description(""))
       ->group("Frames");
-  addFrameOptions(app, options.frames);
+  addFrameRange(app, options.frames);
 }
 
 scene::SceneFile openScene(const SceneOptions& options) {
@@ -152,8 +157,7 @@ void printPlan(const scene::SceneFile& scene, std::int64_t frame,
   const std::string type = scene.estimator.text("type");
   printLine("frame {}: {} x {} pixels, estimator {}, smoke {}", frame, setup.camera->resolution().x,
             setup.camera->resolution().y, type, formatBox(setup.worldBounds));
-  for (const scene::EffectState& effect : setup.effectStates)
-    printLine("  {:<20} {:<4} {}", effect.name, effect.on ? "on" : "off", effect.why);
+  printEffects(setup.effectStates);
   const bool storesLight = scene::storesLight(scene, setup);
   if (storesLight)
     printLine("  {:<20} {}", setup.photonMap ? "photon map" : "light field",
@@ -163,6 +167,12 @@ void printPlan(const scene::SceneFile& scene, std::int64_t frame,
   for (const std::string& note : setup.notes)
     log::info("{}", note);
   scene::checkMemory(setup, storesLight);
+}
+
+void printEffects(const std::vector<scene::EffectState>& effects) {
+  for (const scene::EffectState& effect : effects)
+    printLine("  {:<20} {:<4} {:<8} {}", effect.name, effect.on ? "on" : "off",
+              effect.bound ? fmt::format("{:.2g}", *effect.bound) : "-", effect.why);
 }
 
 void printDryRun(std::int64_t frame, const std::string& output, std::int64_t cacheFrame,

@@ -1,5 +1,5 @@
 #pragma once
-// Options of the commands that work on a scene: trace and render.
+// Options of the commands that work on a scene: plan, trace and render.
 
 #include <cstdint>
 #include <optional>
@@ -28,6 +28,8 @@ struct SceneOptions {
 };
 
 void addSceneOptions(CLI::App& app, SceneOptions& options);
+/// Those of them that act where nothing is written.
+void addPlanOptions(CLI::App& app, SceneOptions& options);
 
 /// The scene that the options name, with their overrides: a .toml file, or any cache, for which a
 /// scene is made up and its choices are reported.
@@ -55,6 +57,9 @@ class CacheFrames {
 /// @throws what scene::setUpFrame throws
 void printPlan(const scene::SceneFile& scene, std::int64_t frame,
                const scene::RenderRequest& request, bool forLightCache);
+
+/// A line an effect: its name, on or off, the bound of what is left out, why.
+void printEffects(const std::vector<scene::EffectState>& effects);
 
 /// What --dry-run prints of every frame.
 /// @param smoke  false where --cache-hold clip leaves nothing to show

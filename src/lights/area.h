@@ -77,6 +77,15 @@ class SurfaceLight : public Light {
             m_radiance * static_cast<float>(d.weight * area())};
   }
 
+  /// From any point of the body at once; no sky holds more of it than its half.
+  Reach reach(const BoundingSphere& bounds) const override {
+    const double radiance = maxComponent(Vec3d(m_radiance));
+    Reach reach = reachFrom(center(), extent(), radiance * area(), bounds);
+    reach.fluence = isBehind(bounds) ? 0.0 : std::min(reach.fluence, 2 * kPi * radiance);
+    reach.radiance = radiance;
+    return reach;
+  }
+
   bool isDelta() const override { return false; }
   bool isGrey() const override { return isGreyColor(m_radiance); }
 
@@ -86,6 +95,13 @@ class SurfaceLight : public Light {
   /// @param bounds  of the smoke, toward which a round surface may lay out its points
   virtual SurfacePoint surface(const Vec2f& u, const BoundingSphere& bounds) const = 0;
   virtual double area() const = 0;  ///< [m^2]
+  virtual const Vec3d& center() const = 0;
+  virtual double extent() const = 0;  ///< of no point from the centre more [m]
+  /// True when the whole sphere lies on a side that stays dark.
+  virtual bool isBehind(const BoundingSphere& bounds) const {
+    (void)bounds;
+    return false;
+  }
 
  private:
   Rgb m_radiance;
@@ -113,6 +129,11 @@ class FlatLight : public SurfaceLight {
  private:
   SurfacePoint surface(const Vec2f& u, const BoundingSphere&) const override {
     return {m_center + offset(u), m_axis};
+  }
+
+  const Vec3d& center() const override { return m_center; }
+  bool isBehind(const BoundingSphere& bounds) const override {
+    return glm::dot(bounds.center - m_center, m_axis) + bounds.radius <= 0;
   }
 
   Vec3d m_center, m_axis;

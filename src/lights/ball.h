@@ -56,6 +56,8 @@ class BallLight : public SurfaceLight {
     return {m_center + normal * m_radius, normal};
   }
   double area() const override { return 4 * kPi * m_radius * m_radius; }
+  const Vec3d& center() const override { return m_center; }
+  double extent() const override { return m_radius; }
 
   Vec3d m_center;
   double m_radius;  // [m]

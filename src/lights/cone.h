@@ -65,6 +65,24 @@ inline Vec3d photonOrigin(const Vec3d& position, const Vec3d& direction,
   return position + direction * glm::max(0.0, distance - bounds.radius);
 }
 
+/// What a body of one radiance, or a point of one intensity, can bring to a sphere: all that it
+/// sends out stands `extent` or nearer to its centre.
+/// @param strength  [W/sr]: intensity of a point, radiance times area of a body
+inline Reach reachFrom(const Vec3d& position, double extent, double strength,
+                       const BoundingSphere& bounds) {
+  const Cone cone = coneToward(position, {bounds.center, bounds.radius + extent});
+  const double nearest =
+      glm::max(0.0, glm::length(bounds.center - position) - bounds.radius - extent);
+  Reach reach;
+  // 1/d^2 stops growing where a float position cannot tell the distance (PointSource).
+  const double floor = glm::max(1e-9, 1e-7 * glm::length(position));
+  reach.fluence = strength > 0 ? strength / std::pow(glm::max(nearest, floor), 2.0) : 0.0;
+  reach.background = 0.0;
+  reach.axis = cone.axis;
+  reach.oneMinusCos = cone.oneMinusCos;
+  return reach;
+}
+
 /// A photon origin on the disc across `direction` that covers the sphere, one radius before its
 /// centre.
 inline Vec3d discOrigin(const Vec3d& direction, const BoundingSphere& bounds, const Vec2f& disc) {

@@ -17,6 +17,13 @@ class DirectionalLight final : public Light {
     return m_irradiance * static_cast<float>(kPi * bounds.radius * bounds.radius);
   }
 
+  Reach reach(const BoundingSphere&) const override {
+    return {.fluence = maxComponent(Vec3d(m_irradiance)),
+            .background = 0.0,
+            .axis = m_direction,
+            .oneMinusCos = 0.0};
+  }
+
   Emission emit(const BoundingSphere& bounds, const Vec4f& u) const override {
     return {discOrigin(m_direction, bounds, sampleDisc({u.x, u.y})), Vec3f(m_direction),
             power(bounds)};

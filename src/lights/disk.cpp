@@ -18,6 +18,7 @@ class DiskLight final : public FlatLight {
     return m_across.x * p.x + m_across.y * p.y;
   }
   double area() const override { return kPi * m_radius * m_radius; }
+  double extent() const override { return m_radius; }
 
   Across m_across;
   double m_radius;  // [m]

@@ -22,6 +22,11 @@ class EnvironmentLight final : public Light {
     return m_radiance * static_cast<float>(4 * kPi * kPi * bounds.radius * bounds.radius);
   }
 
+  Reach reach(const BoundingSphere&) const override {
+    const double radiance = maxComponent(Vec3d(m_radiance));
+    return {.fluence = 4 * kPi * radiance, .radiance = radiance, .background = radiance};
+  }
+
   Emission emit(const BoundingSphere& bounds, const Vec4f& u) const override {
     const Vec3f direction = sampleSphere({u.x, u.y});
     const Vec3d axis = glm::normalize(Vec3d(direction));
@@ -48,6 +53,12 @@ class MappedLight final : public Light {
 
   Rgb power(const BoundingSphere& bounds) const override {
     return m_map.integral() * crossSection(bounds);
+  }
+
+  Reach reach(const BoundingSphere&) const override {
+    return {.fluence = m_map.mostFluence(),
+            .radiance = m_map.mostRadiance(),
+            .background = m_map.mostRadiance()};
   }
 
   Emission emit(const BoundingSphere& bounds, const Vec4f& u) const override {

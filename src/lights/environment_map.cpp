@@ -23,6 +23,7 @@ EnvironmentMap::EnvironmentMap(const image::Image& image, const Rgb& scale)
   for (std::size_t i = 0; i < m_pixels.size(); ++i) {
     m_pixels[i] = scale * Rgb(usable(red[i]), usable(green[i]), usable(blue[i]));
     const Rgb& p = m_pixels[i];
+    m_brightest = std::max(m_brightest, maxComponent(p));
     m_grey = m_grey && p.r == p.g && p.g == p.b;
   }
   for (int y = 0; y <= m_height; ++y)

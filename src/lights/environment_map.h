@@ -28,6 +28,11 @@ class EnvironmentMap {
   Rgb radiance(const Vec3f& toward) const;
   /// Integral of the density's pixels' radiance over all directions [W m^-2].
   const Rgb& integral() const { return m_integral; }
+  /// No more than this arrives from all directions together [W m^-2], read between pixels: the
+  /// density weighs each pixel by the brightest mean channel around it.
+  double mostFluence() const { return (m_grey ? 1.0 : 3.0) * m_total; }
+  /// The brightest channel of a pixel [W m^-2 sr^-1].
+  double mostRadiance() const { return static_cast<double>(m_brightest); }
   bool isGrey() const { return m_grey; }
   void addContent(Hasher& hasher) const;
 
@@ -42,6 +47,7 @@ class EnvironmentMap {
   std::vector<double> m_latitudes;  // cosine of the angle from +Y at the upper edge of each row
   double m_total = 0;
   Rgb m_integral{0.0f};
+  float m_brightest = 0.0f;
   bool m_grey = true;
 };
 

@@ -42,6 +42,24 @@ class Falloff {
   double m_outer, m_inner;  // 1 - cos where the light ends and where it is full
 };
 
+/// What a spot, or a ball of that radius whose points all shine as one, can bring to a sphere: full
+/// where the sphere lies nearest to its axis, dark where its cone misses the sphere.
+/// @param intensity  far away, on the axis [W/sr]
+inline Reach spotReach(const Vec3d& position, const Vec3d& axis, double intensity,
+                       const Falloff& falloff, double radius, const BoundingSphere& bounds) {
+  constexpr double slack = 1e-6;  // more than rounding takes from an angle [rad]
+  Reach reach = reachFrom(position, radius, intensity, bounds);
+  const double between = angleFromOneMinusCos(oneMinusCosBetween(axis, reach.axis));
+  const double nearest =
+      reach.oneMinusCos >= 2.0 ? 0.0 : between - angleFromOneMinusCos(reach.oneMinusCos) - slack;
+  reach.fluence *= falloff(oneMinusCos(std::max(0.0, nearest)));
+  if (falloff.outer() < reach.oneMinusCos) {
+    reach.axis = axis;
+    reach.oneMinusCos = falloff.outer();
+  }
+  return reach;
+}
+
 /// Integral of the falloff over the solid angle that the spot shares with a cone [sr]. Pieces
 /// between the angles where the integrand has a kink; t^2 (3 - 2 t) flattens the square roots at
 /// their ends.

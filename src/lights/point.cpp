@@ -15,6 +15,10 @@ class PointLight final : public Light {
            static_cast<float>(coneToward(m_source.position(), bounds).solidAngle());
   }
 
+  Reach reach(const BoundingSphere& bounds) const override {
+    return reachFrom(m_source.position(), 0.0, maxComponent(Vec3d(m_source.intensity())), bounds);
+  }
+
   Emission emit(const BoundingSphere& bounds, const Vec4f& u) const override {
     const Cone cone = coneToward(m_source.position(), bounds);
     const Vec3d direction =

@@ -22,6 +22,7 @@ class RectLight final : public FlatLight {
     return m_first * (static_cast<double>(u.x) - 0.5) + m_second * (static_cast<double>(u.y) - 0.5);
   }
   double area() const override { return m_area; }
+  double extent() const override { return 0.5 * glm::length(m_first + m_second); }
 
   Vec3d m_first, m_second;  // its sides [m]
   double m_area;

@@ -94,6 +94,15 @@ class SoftSpot final : public Light {
     return m_intensity * static_cast<float>(sum);
   }
 
+  /// Its solid angle is at most that of a disc at the ball's nearest point.
+  Reach reach(const BoundingSphere& bounds) const override {
+    const double intensity = maxComponent(Vec3d(m_intensity));
+    Reach reach = spotReach(m_center, m_axis, intensity, m_falloff, m_radius, bounds);
+    reach.radiance = intensity / (kPi * m_radius * m_radius);
+    reach.fluence = std::min(reach.fluence, 2 * kPi * reach.radiance);
+    return reach;
+  }
+
   /// A direction from the smaller of the spot's cone and those that can reach the sphere, and a
   /// line from the smaller of the two discs across it.
   Emission emit(const BoundingSphere& bounds, const Vec4f& u) const override {

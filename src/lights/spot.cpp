@@ -18,6 +18,11 @@ class SpotLight final : public Light {
                                       m_falloff, m_axis, coneToward(m_source.position(), bounds)));
   }
 
+  Reach reach(const BoundingSphere& bounds) const override {
+    return spotReach(m_source.position(), m_axis, maxComponent(Vec3d(m_source.intensity())),
+                     m_falloff, 0.0, bounds);
+  }
+
   /// Draws from the smaller of the spot's cone and the sphere's; what falls outside the other has
   /// no power.
   Emission emit(const BoundingSphere& bounds, const Vec4f& u) const override {

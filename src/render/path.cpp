@@ -78,6 +78,7 @@ class PathIntegrator final : public Integrator {
       const Vec3f p = segment.origin + segment.direction * hit.distance;
       if (!m_options.effects.singleScattering && !m_options.effects.multipleScattering)
         return result;
+      if (scatterings > 0 && !m_options.effects.multipleScattering) return result;
       const bool last = m_options.maxScatter > 0 && scatterings >= m_options.maxScatter;
       // Where channels differ, light may still pass what stands for a collision.
       if (last && std::is_same_v<Light, float>) return capped(result, throughput, counters);

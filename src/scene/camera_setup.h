@@ -5,9 +5,6 @@
 
 namespace photosphere::scene {
 
-/// Blur that a pixel filter hides: a tenth of its width [pixels].
-inline constexpr double kUnseenBlur = 0.3;
-
 /// Degrees across the frame, as the camera's own options say.
 double horizontalFov(const ParamValues& camera);
 

@@ -5,37 +5,13 @@
 #include <algorithm>
 
 #include "estimator_options.h"
+#include "layer_renderer.h"
 #include "light_stage.h"
 #include "photon_map_stage.h"
-#include "photosphere/render/integrator.h"
-#include "photosphere/render/shadows.h"
 
 namespace photosphere::scene {
 
 namespace {
-
-render::ShadowMode shadowMode(const std::string& name) {
-  if (name == "march") return render::ShadowMode::march;
-  if (name == "track") return render::ShadowMode::track;
-  return render::ShadowMode::grid;
-}
-
-render::FilterKind filterKind(const std::string& name) {
-  if (name == "box") return render::FilterKind::box;
-  if (name == "triangle") return render::FilterKind::triangle;
-  return render::FilterKind::blackmanHarris;
-}
-
-// What a path tracer or a light cache holds although the scene switched it off.
-void dropLayers(const Effects& effects, render::FrameLayers& layers) {
-  if (effects.singleScattering && effects.multipleScattering) return;
-  for (std::size_t i = 0; i < layers.beauty.size(); ++i) {
-    if (!effects.singleScattering) layers.single[i] = Rgb(0.0f);
-    if (!effects.multipleScattering) layers.multiple[i] = Rgb(0.0f);
-    layers.beauty[i] =
-        layers.single[i] + layers.multiple[i] + layers.emission[i] + layers.background[i];
-  }
-}
 
 // A basis that can go negative is clamped where it is read.
 void noteClamped(double share, FrameSetup& setup, FrameStatistics& statistics) {
@@ -100,92 +76,6 @@ PassLight prepareLight(const SceneFile& scene, const RenderRequest& request, int
   light.source = std::move(source);
   return light;
 }
-
-std::uint64_t shadowBudget(const FrameSetup& setup) {
-  if (setup.memoryBudget == 0) return 0;
-  const std::uint64_t used = setup.medium->memoryBytes();
-  return setup.memoryBudget > used ? setup.memoryBudget - used : 1;
-}
-
-render::FrameOptions frameOptions(const SceneFile& scene, const render::Crop& crop,
-                                  const FrameSetup& setup, bool paths) {
-  render::FrameOptions options;
-  const auto samples = static_cast<int>(paths ? scene.estimator.integer("samples")
-                                              : scene.render.integer("samples"));
-  options.samples = (samples + setup.batches - 1) / setup.batches;
-  options.filter = filterKind(scene.render.text("filter"));
-  options.filterWidth = scene.render.real("filter_width");
-  options.crop = crop;
-  options.space = setup.space;
-  options.lens = setup.lens;
-  options.moving = setup.medium->isMoving() || setup.motion;
-  options.shutter = setup.medium->shutter();
-  options.motion = setup.motion.get();
-  return options;
-}
-
-// Paths of one truth that a frame's stored light is held against. Blocks are as many in every
-// frame, so what they need does not grow with its pixels.
-constexpr std::int64_t kTruthPaths = 150'000;
-
-// Rays through the smoke, for one pass of a frame or several.
-class LayerRenderer {
- public:
-  LayerRenderer(const SceneFile& scene, const render::Crop& crop, const FrameSetup& setup)
-      : m_setup(setup),
-        m_paths(scene.estimator.text("type") == "path_traced"),
-        m_options(frameOptions(scene, crop, setup, m_paths)) {
-    if (m_paths) m_path.maxScatter = static_cast<int>(scene.estimator.integer("max_scatter"));
-    m_path.effects = m_march.effects = setup.effects;
-    m_march.step = static_cast<float>(scene.render.real("step"));
-    if (m_paths) return;
-    if (storesLight(scene, setup))
-      m_march.gatherRays = static_cast<int>(
-          (scene.estimator.integer("final_gather") + m_options.samples - 1) / m_options.samples);
-    const bool shadowed = setup.effects.singleScattering && setup.effects.shadows;
-    const auto mode = shadowed || m_march.gatherRays > 0
-                          ? shadowMode(scene.render.text("shadow"))
-                          : render::ShadowMode::march;  // tabulates nothing
-    m_shadows.emplace(*setup.medium, setup.lights, mode,
-                      m_march.step * static_cast<float>(setup.medium->voxelEdge()),
-                      shadowBudget(setup));
-  }
-
-  /// @param source  the estimator's answer; may be null
-  render::FrameLayers render(const estimators::InscatterSource* source, int pass) const {
-    render::FrameOptions options = m_options;
-    options.key = m_setup.key;
-    options.firstSample = pass * options.samples;
-    const auto integrator =
-        m_paths ? render::makePathIntegrator(*m_setup.medium, m_setup.lights, m_path)
-                : render::makeMarchIntegrator(*m_setup.medium, m_setup.lights, *m_shadows, source,
-                                              m_march);
-    render::FrameLayers layers = render::renderFrame(*m_setup.camera, *integrator, options);
-    dropLayers(m_setup.effects, layers);
-    return layers;
-  }
-
-  /// `beauty` as path tracing has it, from a few paths a pixel and random numbers of its own.
-  std::vector<Rgb> truth(RandomKey key) const {
-    render::FrameOptions options = m_options;
-    const Vec2i size = options.crop.max - options.crop.min;
-    const std::int64_t pixels = std::max<std::int64_t>(1, std::int64_t{size.x} * size.y);
-    options.samples = static_cast<int>(std::clamp<std::int64_t>(kTruthPaths / pixels, 1, 64));
-    options.key = key;
-    const auto integrator = render::makePathIntegrator(*m_setup.medium, m_setup.lights, m_path);
-    render::FrameLayers layers = render::renderFrame(*m_setup.camera, *integrator, options);
-    dropLayers(m_setup.effects, layers);
-    return std::move(layers.beauty);
-  }
-
- private:
-  const FrameSetup& m_setup;
-  bool m_paths;
-  render::FrameOptions m_options;
-  render::PathOptions m_path;
-  render::MarchOptions m_march;
-  std::optional<render::Shadows> m_shadows;
-};
 
 // The frame in independent batches, each of photons, samples and random numbers of its own, until
 // its error or the time is what was asked for.

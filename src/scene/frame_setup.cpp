@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "camera_setup.h"
+#include "effect_plan.h"
 #include "estimator_options.h"
 #include "photon_map_stage.h"
 #include "photosphere/core/error.h"
@@ -12,6 +14,7 @@
 #include "photosphere/core/registry.h"
 #include "photosphere/core/resources.h"
 #include "photosphere/phase/phase.h"
+#include "photosphere/scene/plan.h"
 #include "photosphere/volume/rasterize.h"
 #include "photosphere/volume/vdb_file.h"
 #include "photosphere/volume/velocity.h"
@@ -46,6 +49,25 @@ std::uint64_t memoryBudget(const SceneFile& scene) {
   const double bytes = limit > 0 ? limit * 1024.0 * 1024.0 * 1024.0
                                  : 0.85 * static_cast<double>(availableMemoryBytes());
   return static_cast<std::uint64_t>(std::max(1.0, std::min(bytes, 9e18)));
+}
+
+bool sameNodes(const volume::BrickField<float>& a, const volume::BrickField<float>& b) {
+  if (a.origin() != b.origin() || a.bricks() != b.bricks() || a.empty() != b.empty()) return false;
+  const Vec3i& bricks = a.bricks();
+  for (int z = 0; z < bricks.z && !a.empty(); ++z)
+    for (int y = 0; y < bricks.y; ++y)
+      for (int x = 0; x < bricks.x; ++x) {
+        const std::int32_t i = a.brickAt({x, y, z}), j = b.brickAt({x, y, z});
+        if ((i < 0) != (j < 0)) return false;
+        if (i >= 0 && !std::equal(a.nodes(i), a.nodes(i) + a.kBrickSize, b.nodes(j))) return false;
+      }
+  return true;
+}
+
+// One field says what three equal ones do: the albedo is grey.
+void dropEqualChannels(std::vector<volume::BrickField<float>>& fields) {
+  if (fields.size() == 3 && sameNodes(fields[0], fields[1]) && sameNodes(fields[0], fields[2]))
+    fields.resize(1);
 }
 
 // Largest of [r, g, b].
@@ -97,6 +119,7 @@ transport::MediumVolume placeVolume(const VolumeEntry& entry, const VolumeSource
     for (int c = 0; c < components; ++c)
       placed.albedoFields.push_back(
           volume::bricksFromGrid(source.albedo, c, source.path, false, budget));
+    dropEqualChannels(placed.albedoFields);
     placed.localFromAlbedoNode = localFromWorld(space) * source.worldFromIndex(source.albedo) *
                                  nodeShift(placed.albedoFields.front().origin());
   }
@@ -190,174 +213,6 @@ void buildLights(const SceneFile& scene, FrameSetup& setup) {
   }
 }
 
-class EffectPlan {
- public:
-  EffectPlan(const SceneFile& scene, FrameSetup& setup) : m_scene(scene), m_setup(setup) {}
-
-  void decide() {
-    Effects& e = m_setup.effects;
-    const transport::Medium& medium = *m_setup.medium;
-    const bool glows = medium.emission() != nullptr;
-    const bool lamps = !m_setup.lights.empty();
-    const std::string inert = !(medium.majorants().maximum() > 0) ? "there is no smoke"
-                              : medium.maximumAlbedo() <= 0 ? "the smoke only absorbs (albedo 0)"
-                                                            : "";
-    const std::string dark = !inert.empty() ? inert : lamps ? "" : "there is no light";
-    const bool single = m_scene.estimator.text("type") == "single";
-    e.emission = unlessOff("emission", glows ? "" : "no volume emits", "a volume emits");
-    e.singleScattering = unlessOff("single_scattering", dark, "lights reach smoke that scatters");
-    e.multipleScattering = unlessOff(
-        "multiple_scattering",
-        single                   ? "estimator.type is single"
-        : glows && inert.empty() ? ""
-                                 : dark,
-        lamps ? "lights reach smoke that scatters" : "smoke scatters the light that it gives off");
-    e.shadows = unlessOff("shadows", dark, "smoke casts shadows on itself");
-    chromatic();
-    motionBlur();
-    depthOfField();
-    bool surroundings = false;
-    for (const LightEntry& light : m_scene.lights)
-      surroundings = surroundings || light.type == "environment";
-    e.environment = unlessOff("environment", surroundings ? "" : "there is no environment light",
-                              "an environment shines");
-  }
-
- private:
-  bool note(const std::string& name, bool on, const std::string& why) {
-    m_setup.effectStates.push_back({name, on, why});
-    return on;
-  }
-  // @param never  why it cannot contribute; empty when it can
-  bool unlessOff(const std::string& name, const std::string& never, const std::string& why) {
-    if (m_scene.effects.text(name) == "off") return note(name, false, "off in the scene");
-    return never.empty() ? note(name, true, why) : note(name, false, never);
-  }
-  // Off where nothing moves farther than a pixel filter sees.
-  void motionBlur() {
-    bool& on = m_setup.effects.motionBlur;
-    on = false;
-    const std::string& wish = m_scene.effects.text("motion_blur");
-    if (wish == "off") {
-      note("motion_blur", false, "off in the scene");
-    } else if (!m_setup.medium->isMoving() && !m_setup.motion) {
-      note("motion_blur", false, "no volume has a velocity, and the camera stands still");
-    } else {
-      const double smoke = m_setup.medium->isMoving() ? smokeBlur() : 0.0;
-      const double camera = m_setup.motion ? m_setup.motion->blur(m_setup.worldBounds) : 0.0;
-      on = wish == "on" || smoke + camera > kUnseenBlur;
-      note("motion_blur", on,
-           fmt::format("the {} by up to {:.2g} pixels while the shutter is open",
-                       !m_setup.motion               ? "smoke moves"
-                       : !m_setup.medium->isMoving() ? "camera moves the smoke"
-                                                     : "smoke and the camera move it",
-                       smoke + camera));
-      if (on) return;
-      if (m_setup.medium->isMoving()) *m_setup.medium = std::move(*m_setup.medium).held();
-      m_setup.motion.reset();
-    }
-  }
-  // Farthest way of the fastest smoke, seen from as near as any smoke is [pixels].
-  double smokeBlur() const {
-    const transport::Medium& medium = *m_setup.medium;
-    const transport::Shutter& shutter = medium.shutter();
-    const double way = medium.displacement() / shutter.longest() * (shutter.close - shutter.open) /
-                       m_setup.space.metersPerUnit;
-    return way * pixelsPerUnit();
-  }
-  // Of the nearest smoke, in any direction [pixels per scene unit].
-  double pixelsPerUnit() const {
-    const cameras::Camera& camera = *m_setup.camera;
-    const double width = camera.resolution().x;
-    const Box3d& box = m_setup.worldBounds;
-    if (!camera.hasEye())
-      return 1 / glm::length(camera.ray({1, 0}).origin - camera.ray({0, 0}).origin);
-    const Vec3d nearest = glm::clamp(camera.position(), box.min, box.max);
-    const double distance = std::max(glm::length(nearest - camera.position()), 1e-9);
-    return camera.isPanorama()
-               ? width / (2 * kPi * distance)
-               : width / (2 * std::tan(horizontalFov(m_scene.camera) * kPi / 360) * distance);
-  }
-  // Off where the widest blur in the smoke is less than a pixel filter sees.
-  void depthOfField() {
-    const ParamValues& camera = m_scene.camera;
-    const double fstop = camera.real("fstop");
-    const std::string& wish = m_scene.effects.text("depth_of_field");
-    bool& on = m_setup.effects.depthOfField;
-    on = false;
-    if (wish == "off") {
-      note("depth_of_field", false, "off in the scene");
-    } else if (!(fstop > 0)) {
-      note("depth_of_field", false, "the camera is a pinhole");
-    } else if (m_scene.cameraType != "perspective") {
-      note("depth_of_field", false, "only a perspective camera has a lens");
-    } else {
-      const render::Lens lens = lensOf(camera, fstop);
-      const double blur = widestBlur(lens);
-      on = wish == "on" || blur > kUnseenBlur;
-      note("depth_of_field", on,
-           fmt::format("the lens blurs the smoke over up to {:.2g} pixels", blur));
-      if (on) m_setup.lens = lens;
-    }
-  }
-  // Focal length over twice the f-number; in focus by default: the middle of the smoke.
-  render::Lens lensOf(const ParamValues& camera, double fstop) const {
-    const double millimetres =
-        camera.given("focal_length")
-            ? camera.real("focal_length")
-            : camera.real("horizontal_aperture") / 2 / std::tan(horizontalFov(camera) * kPi / 360);
-    const double focus = camera.real("focus_distance");
-    return {millimetres / 1000 / m_setup.space.metersPerUnit / (2 * fstop),
-            focus > 0 ? focus : std::max(1e-6, along(m_setup.worldBounds.center()))};
-  }
-  double along(const Vec3d& p) const {
-    return glm::dot(p - m_setup.camera->position(), m_setup.camera->viewDirection());
-  }
-  // Diameter of the circle of confusion at the ends of the smoke [pixels].
-  double widestBlur(const render::Lens& lens) const {
-    const Box3d& box = m_setup.worldBounds;
-    if (box.empty()) return 0;
-    double nearest = 1e300, farthest = 0;
-    for (int corner = 0; corner < 8; ++corner) {
-      const double d =
-          along({corner & 1 ? box.max.x : box.min.x, corner & 2 ? box.max.y : box.min.y,
-                 corner & 4 ? box.max.z : box.min.z});
-      nearest = std::min(nearest, d);
-      farthest = std::max(farthest, d);
-    }
-    const double tanHalf = std::tan(horizontalFov(m_scene.camera) * kPi / 360);
-    const double pixels = m_setup.camera->resolution().x / (2 * tanHalf);
-    const auto blur = [&](double d) {
-      return 2 * lens.radius * pixels * std::abs(1 / std::max(d, 1e-6) - 1 / lens.focusDistance);
-    };
-    return std::max(blur(nearest), blur(farthest));
-  }
-
-  void chromatic() {
-    std::string coloured = m_setup.medium->isColoured() ? "extinction is coloured"
-                           : m_setup.medium->isGrey()   ? ""
-                                                        : "an albedo is coloured";
-    const transport::Emission* emission = m_setup.medium->emission();
-    if (emission && !emission->isGrey()) coloured = "the emission is coloured";
-    for (const auto& light : m_setup.lights)
-      if (!light->isGrey()) coloured = fmt::format("light '{}' is coloured", light->name());
-    const std::string& wish = m_scene.effects.text("chromatic");
-    if (wish == "off" && !coloured.empty())
-      throw ConfigError(
-          fmt::format("[effects]: chromatic = \"off\", but {}; one channel cannot "
-                      "hold that, so make it grey or leave chromatic at auto",
-                      coloured));
-    m_setup.effects.chromatic =
-        wish == "on" ? note("chromatic", true, "on in the scene")
-                     : note("chromatic", !coloured.empty(),
-                            coloured.empty() ? "lights, extinction, albedos and emission are grey"
-                                             : coloured);
-  }
-
-  const SceneFile& m_scene;
-  FrameSetup& m_setup;
-};
-
 // Nearest-neighbour spacing of the carriers [m].
 double carrierSpacing(const std::vector<Vec3f>& particles) {
   volume::ParticleSet set;
@@ -414,7 +269,17 @@ void buildLayout(const SceneFile& scene, const SetupOptions& options, FrameSetup
                       "direction, as estimator.basis = \"view\" would be noisier",
                       g, l.bins()));
   }
-  heedParallax(scene, setup);
+  // Light without directions serves every eye.
+  const bool even = scattersEvenly(*setup.medium);
+  if (!even) heedParallax(scene, setup);
+  // Bins would all be read alike: one coefficient holds what counts.
+  const bool ofBins = l.direction != sphere::DirectionDeposit::nearest ||
+                      l.representative != Representative::bin || l.merge != Merge::full ||
+                      l.angularKernel != sphere::AngularKernel::none;
+  if (e.text("basis") == "auto" && l.basis == Basis::histogram && !ofBins && even) {
+    l.basis = Basis::sphericalHarmonics;
+    l.order = 0;
+  }
   l.channels = setup.effects.chromatic ? 3 : 1;
   l.phases = static_cast<int>(setup.medium->phases().size());
   for (const auto& light : setup.lights)
@@ -446,7 +311,7 @@ FrameSetup setUpFrame(const SceneFile& written, std::int64_t frame, const SetupO
   buildMedium(scene, options.cacheFrame.value_or(frame), particles, setup);
   buildLights(scene, setup);
   buildCamera(scene, setup);
-  EffectPlan(scene, setup).decide();
+  planEffects(scene, options.forLightCache || !scene.estimator.text("cache").empty(), setup);
   viewFromTheMiddle(setup);
   buildLayout(scene, options, setup);
   const std::int64_t seed = options.seed.value_or(scene.scene.integer("seed"));
@@ -490,16 +355,21 @@ std::uint64_t predictedLightBytes(const FrameSetup& setup) {
   return bytes + transport::SupportLattice(medium, edge, margin).size() * values * bytesEach;
 }
 
+FrameMemory predictedMemory(const FrameSetup& setup, bool storedLight) {
+  FrameMemory memory;
+  memory.smoke = setup.medium->memoryBytes();
+  memory.light = storedLight ? predictedLightBytes(setup) : 0;
+  const Vec2i size = setup.camera->resolution();
+  memory.pixels = static_cast<std::uint64_t>(size.x) * static_cast<std::uint64_t>(size.y) *
+                  (6 * sizeof(Rgb) + 2 * sizeof(float)) *
+                  (setup.batches > 1 || (setup.photonMap && setup.photonMap->passes > 1) ? 3 : 1);
+  return memory;
+}
+
 void checkMemory(const FrameSetup& setup, bool storedLight) {
   if (setup.memoryBudget == 0) return;
-  const std::uint64_t smoke = setup.medium->memoryBytes();
-  const std::uint64_t light = storedLight ? predictedLightBytes(setup) : 0;
-  const Vec2i size = setup.camera->resolution();
-  const std::uint64_t frame =
-      static_cast<std::uint64_t>(size.x) * static_cast<std::uint64_t>(size.y) *
-      (6 * sizeof(Rgb) + 2 * sizeof(float)) *
-      (setup.batches > 1 || (setup.photonMap && setup.photonMap->passes > 1) ? 3 : 1);
-  if (smoke + light + frame <= setup.memoryBudget) return;
+  const FrameMemory memory = predictedMemory(setup, storedLight);
+  if (memory.total() <= setup.memoryBudget) return;
   const std::string_view less =
       setup.photonMap
           ? "Lower estimator.photons (with estimator.passes, as many photons in less memory)"
@@ -508,8 +378,8 @@ void checkMemory(const FrameSetup& setup, bool storedLight) {
   throw MemoryError(fmt::format(
       "this frame needs about {}: {} for the smoke, {} for stored light, {} for pixels; the budget "
       "is {}. {}, lower the resolution, or raise render.memory_limit (-1 = none)",
-      formatBytes(smoke + light + frame), formatBytes(smoke), formatBytes(light),
-      formatBytes(frame), formatBytes(setup.memoryBudget), less));
+      formatBytes(memory.total()), formatBytes(memory.smoke), formatBytes(memory.light),
+      formatBytes(memory.pixels), formatBytes(setup.memoryBudget), less));
 }
 
 }  // namespace photosphere::scene

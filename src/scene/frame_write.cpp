@@ -11,7 +11,7 @@
 #include "photosphere/core/version.h"
 #include "photosphere/image/color.h"
 #include "photosphere/image/preview.h"
-#include "photosphere/scene/pipeline.h"
+#include "photosphere/scene/plan.h"
 
 namespace photosphere::scene {
 
@@ -44,10 +44,10 @@ std::string secondsText(const StageSeconds& s) {
                      s.read, s.rasterize, s.trace, s.resolve, s.march);
 }
 
-std::string effectsText(const std::vector<EffectState>& effects) {
+std::string boundsText(const std::vector<EffectState>& effects) {
   std::vector<std::string> parts;
   for (const EffectState& effect : effects)
-    parts.push_back(fmt::format("{} {}", effect.name, effect.on ? "on" : "off"));
+    if (effect.bound) parts.push_back(fmt::format("{} {:.3g}", effect.name, *effect.bound));
   return fmt::format("{}", fmt::join(parts, ", "));
 }
 
@@ -72,7 +72,8 @@ image::ExrAttributes header(const FrameResult& result,
   own["scene_hash"] = s.sceneHash;
   own["medium_hash"] = s.mediumHash;
   own["seed"] = std::to_string(result.seed);
-  own["effects"] = effectsText(s.effects);
+  own["effects"] = planLine(s.effects);
+  own["effect_bounds"] = boundsText(s.effects);
   if (s.error)
     own["error"] = fmt::format("{:.4g} relative (noise {:.4g}, bias {:.4g}) from {} batches",
                                s.error->total(), s.error->noise, s.error->bias, s.batches);

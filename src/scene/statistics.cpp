@@ -1,9 +1,9 @@
-// --stats as JSON.
+// --stats and plans as JSON.
 
 #include <nlohmann/json.hpp>
 
 #include "photosphere/core/version.h"
-#include "photosphere/scene/pipeline.h"
+#include "photosphere/scene/plan.h"
 
 namespace photosphere::scene {
 
@@ -12,6 +12,20 @@ namespace {
 // The library writes numbers that are not finite as null.
 nlohmann::ordered_json channels(const Vec3d& v) {
   return {v.x, v.y, v.z};
+}
+
+nlohmann::ordered_json effectsJson(const std::vector<EffectState>& effects) {
+  auto json = nlohmann::ordered_json::object();
+  for (const EffectState& effect : effects) {
+    json[effect.name] = {{"on", effect.on}, {"why", effect.why}, {"bound", nullptr}};
+    if (effect.bound) json[effect.name]["bound"] = *effect.bound;
+  }
+  return json;
+}
+
+// Names come from files and need not be UTF-8.
+std::string text(const nlohmann::ordered_json& json) {
+  return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
 }
 
 }  // namespace
@@ -44,14 +58,29 @@ std::string statsJson(const FrameStatistics& s) {
                      {"bias", s.error->bias},        {"doubt", s.error->doubt},
                      {"batches", s.batches},         {"target_missed", s.targetMissed}};
   if (s.clampedLight > 0) json["clamped_light"] = s.clampedLight;
-  json["effects"] = nlohmann::ordered_json::object();
-  for (const EffectState& effect : s.effects)
-    json["effects"][effect.name] = {{"on", effect.on}, {"why", effect.why}, {"bound", nullptr}};
+  json["effects"] = effectsJson(s.effects);
   json["image"] = {{"mean", s.imageMean}, {"max", s.imageMax}};
   json["version"] = versionText();
   json["scene_hash"] = s.sceneHash;
-  // Names come from files and need not be UTF-8.
-  return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+  return text(json) + "\n";
+}
+
+std::string planJson(const FramePlan& plan) {
+  nlohmann::ordered_json json;
+  json["frame"] = plan.frame;
+  json["resolution"] = {plan.resolution.x, plan.resolution.y};
+  json["estimator"] = plan.estimator;
+  json["layout"] = plan.layout;
+  json["effects"] = effectsJson(plan.effects);
+  const StageSeconds& s = plan.seconds;
+  json["seconds"] = {{"read", s.read},       {"rasterize", s.rasterize}, {"trace", s.trace},
+                     {"resolve", s.resolve}, {"march", s.march},         {"total", s.total}};
+  const FrameMemory& m = plan.memory;
+  json["memory_bytes"] = {{"smoke", m.smoke},     {"light", m.light},
+                          {"shadows", m.shadows}, {"pixels", m.pixels},
+                          {"total", m.total()},   {"budget", plan.memoryBudget}};
+  json["notes"] = plan.notes;
+  return text(json);
 }
 
 }  // namespace photosphere::scene

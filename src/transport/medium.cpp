@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "albedo_range.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/hash.h"
 
@@ -80,8 +81,7 @@ Medium::Medium(std::vector<MediumVolume> volumes, const Shutter& shutter)
       albedo.fields.push_back(place(field, v.localFromAlbedoNode, 1.0, 0));
     m_grey = m_grey && (albedo.fields.empty() ? photosphere::transport::isGrey(v.albedo)
                                               : albedo.fields.size() == 1);
-    m_maximumAlbedo =
-        std::max(m_maximumAlbedo, albedo.fields.empty() ? maxComponent(v.albedo) : 1.0f);
+    m_maximumAlbedo = std::max(m_maximumAlbedo, largestAlbedo(v));
     m_albedo.push_back(std::move(albedo));
     hashVolume(hasher, v);
   }

@@ -317,7 +317,6 @@ const Refusal kRefusals[] = {
     {"Compression", {"render", "scene.toml", "-o", "x.####.exr", "--compression", "lzw"}, 2, "zip"},
     {"Resume", {"render", "scene.toml", "-o", "x.####.exr", "--resume", "auto"}, 2, "not served"},
     {"Shard", {"trace", "scene.toml", "-o", "x.####.vdb", "--shard", "1/2"}, 2, "not served"},
-    {"Plan", {"plan", "scene.toml"}, 2, "not served"},
     {"Merge", {"merge", "a.vdb", "b.vdb", "-o", "c.vdb"}, 2, "not served"},
     {"CacheMissing", {"render", "scene.toml", "-o", "x.exr", "--frames", "9"}, 3, "smoke.0009.vdb"},
     {"GridMissing",

@@ -3,6 +3,7 @@
 // [m] (ARCHITECTURE.md, Precision): world positions minus the smoke's centre, times metres per
 // unit.
 
+#include <limits>
 #include <memory>
 #include <span>
 #include <string>
@@ -45,6 +46,18 @@ struct Emission {
   Rgb power{0.0f};        ///< [W] when one photon is emitted; divide by the count
 };
 
+/// What of a light's unattenuated light can reach a sphere at most: bounds that hold at every point
+/// of it, for the largest channel. Infinite where nothing is known.
+struct Reach {
+  double fluence = std::numeric_limits<double>::infinity();   ///< [W m^-2], over all directions
+  double radiance = std::numeric_limits<double>::infinity();  ///< [W m^-2 sr^-1], in any direction;
+                                                              ///< infinite without extent
+  /// The most that `Light::background` gives in any direction.
+  double background = std::numeric_limits<double>::infinity();
+  Vec3d axis{0.0, 0.0, 1.0};  ///< all of it travels within a cone about this unit direction
+  double oneMinusCos = 2.0;   ///< of the cone's half angle; 2 = in any direction
+};
+
 class Light {
  public:
   virtual ~Light() = default;
@@ -54,6 +67,11 @@ class Light {
   /// Power that reaches the bounding sphere when nothing is in the way [W], per channel: what
   /// photon emission draws from. Zero for a light that cannot reach it.
   virtual Rgb power(const BoundingSphere& bounds) const = 0;
+  /// What a plan may rely on: fluence 0 says that no light reaches the sphere.
+  virtual Reach reach(const BoundingSphere& bounds) const {
+    (void)bounds;
+    return {};
+  }
   /// Draws a photon that enters the bounding sphere, or starts inside it. E[power] = power(bounds);
   /// a photon of power 0 (outside the cone of a spot) need not enter. Thread-safe; same bits on
   /// every CPU.

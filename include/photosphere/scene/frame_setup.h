@@ -36,6 +36,9 @@ struct EffectState {
   std::string name;  ///< as in [effects]
   bool on = false;
   std::string why;
+  /// What was left out is at most this part of the mean radiance of the smoke's pixels, 0 where it
+  /// is exactly nothing; nothing where all of it is simulated, or the scene switched it off.
+  std::optional<double> bound = std::nullopt;
 };
 
 struct FrameSetup {

@@ -173,9 +173,11 @@ class Medium {
   double voxelEdge() const { return m_voxelEdge; }
   /// True when every albedo and extinction has equal channels.
   bool isGrey() const { return m_grey; }
-  /// Largest albedo of any channel anywhere.
+  /// Largest albedo of any channel where there is smoke.
   float maximumAlbedo() const { return m_maximumAlbedo; }
   const std::vector<MediumVolume>& volumes() const { return m_volumes; }
+  /// What it was made of, to make another of.
+  std::vector<MediumVolume> takeVolumes() && { return std::move(m_volumes); }
   /// The same smoke at rest. Leaves this medium empty.
   Medium held() &&;
   /// Hash of everything that light transport depends on, as 16 hex digits.

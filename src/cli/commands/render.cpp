@@ -12,7 +12,7 @@
 #include "photosphere/core/log.h"
 #include "photosphere/core/resources.h"
 #include "photosphere/image/exr.h"
-#include "photosphere/scene/pipeline.h"
+#include "photosphere/scene/plan.h"
 #include "plugin_text.h"
 #include "print.h"
 #include "scene_options.h"
@@ -55,6 +55,7 @@ void renderOne(const scene::SceneFile& scene, std::int64_t frame, Options& optio
   checkWritable(framePath(options.write.preview, frame));
   checkWritable(framePath(options.scene.stats, frame));
   scene::FrameResult result = scene::renderScene(scene, frame, request);
+  log::info("frame {}: plan: {}", frame, scene::planLine(result.statistics.effects));
   for (const std::string& note : result.notes)
     log::info("frame {}: {}", frame, note);
   scene::writeFrame(result, scene, options.write);
