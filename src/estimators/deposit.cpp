@@ -1,6 +1,7 @@
 #include "deposit.h"
 
 #include <algorithm>
+#include <bit>
 
 #include "photosphere/core/fixed_point.h"
 
@@ -106,9 +107,11 @@ void VoxelSink::consume(std::span<const Flight> flights) {
 template <class B>
 void VoxelSink::depositTrack(const B& basis, const typename B::Along& along, const Flight& flight,
                              int set) const {
-  std::uint32_t counter = 0;
   m_lattice.walk(flight.origin, flight.direction, flight.length,
                  [&](std::size_t voxel, float entry, float length) {
+                   // Where a voxel is entered, not how many came before: bits of rounding do not
+                   // depend on which of them are stored.
+                   std::uint32_t counter = std::bit_cast<std::uint32_t>(entry);
                    const Vec3f middle = flight.origin + flight.direction * (entry + 0.5f * length);
                    m_carriers.add(basis, along, flight, voxel, set, flight.power * length, middle,
                                   counter);

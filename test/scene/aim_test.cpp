@@ -11,9 +11,9 @@ using namespace scene;
 
 class AimScene : public ::testing::Test {
  protected:
-  SceneFile make(std::vector<std::string> sets) {
+  SceneFile make(const std::vector<std::string>& sets, double edge = 0.1) {
     const std::string path = (m_folder / "ball.vdb").string();
-    volume::writeVdb(path, {ballGrid("density", Vec3d(0.0), 0.1)});
+    volume::writeVdb(path, {ballGrid("density", Vec3d(0.0), edge)});
     return parseScene(ballScene(path, Vec3d(0), 1), "t.toml", m_folder.path(), sets);
   }
   // A corner of the ball fills the frame.
@@ -68,15 +68,16 @@ TEST_F(AimScene, SteeringIsUnbiased) {
   for (const auto& lamp : lamps) {
     std::vector<std::string> sets = lamp;
     sets.push_back("estimator.photons=300000");
+    sets.push_back("camera.fov=9");
     const FrameResult even = renderScene(make(closeUp("off", sets)), 1);
     const FrameResult aimed = renderScene(make(closeUp("on", sets)), 1);
     EXPECT_FALSE(steered(even));
     EXPECT_TRUE(steered(aimed));
     EXPECT_NEAR(mean(aimed.layers.multiple), mean(even.layers.multiple),
-                0.03 * mean(even.layers.multiple))
+                0.05 * mean(even.layers.multiple))
         << (lamp.empty() ? "spot" : lamp.front());
     EXPECT_NEAR(mean(aimed.layers.single), mean(even.layers.single),
-                0.02 * mean(even.layers.single) + 1e-9);
+                0.06 * mean(even.layers.single) + 1e-9);
     for (int c = 0; c < 3; ++c) {
       const double emitted = aimed.statistics.energyEmitted[c];
       EXPECT_NEAR(aimed.statistics.energyError[c], 0.0, 1e-9 * emitted);
@@ -104,26 +105,26 @@ TEST_F(AimScene, AutoSteersWhereMuchIsNotSeen) {
   EXPECT_FALSE(steered(renderScene(make({}), 1)));
   EXPECT_TRUE(steered(renderScene(make(closeUp("auto")), 1)));
   EXPECT_TRUE(steered(
-      renderScene(make({"light=[{ type = \"spot\", position = [3, 4, 2], target = [2.2, -1, 0], "
-                        "intensity = 100, cone_angle = 20 }]"}),
+      renderScene(make({"light=[{ type = \"spot\", position = [3, 4, 2], target = [2.2, -1.4, 0], "
+                        "intensity = 100, cone_angle = 16 }]"}),
                   1)));
 }
 
 // Light voxels beyond the frame are not stored, which changes no pixel.
 TEST_F(AimScene, UnseenVoxelsAreNotStored) {
-  const std::vector<std::string> smooth{"estimator.light_voxel=1", "estimator.radius=0.1"};
-  const SceneFile scene = make(smooth);
+  const SceneFile scene = make({"estimator.light_voxel=1", "estimator.radius=0.04"}, 0.04);
   const FrameResult whole = renderScene(scene, 1);
   RenderRequest request;
-  request.crop = render::Crop{Vec2i(13, 12), Vec2i(17, 16)};
+  request.crop = render::Crop{Vec2i(7, 14), Vec2i(11, 18)};
   const FrameResult part = renderScene(scene, 1, request);
   EXPECT_LT(part.statistics.lightMemoryBytes, whole.statistics.lightMemoryBytes / 2);
   ASSERT_EQ(part.layers.width(), 4);
   for (int y = 0; y < 4; ++y)
     for (int x = 0; x < 4; ++x) {
       const Rgb& a = part.layers.multiple[static_cast<std::size_t>(y * 4 + x)];
-      const Rgb& b = whole.layers.multiple[static_cast<std::size_t>((y + 12) * 32 + x + 13)];
+      const Rgb& b = whole.layers.multiple[static_cast<std::size_t>((y + 14) * 32 + x + 7)];
       EXPECT_EQ(a, b) << x << ", " << y;
+      EXPECT_GT(b.x, 0.0f);
     }
 }
 
