@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "camera_setup.h"
+#include "blur.h"
 #include "light_bounds.h"
 #include "photosphere/core/error.h"
 #include "photosphere/phase/phase.h"
@@ -18,24 +18,6 @@ namespace {
 // What bounds cannot say of pictures that are looked at here and there: differences between
 // neighbours may be this many times as large as the largest that was met.
 constexpr double kSafety = 2.0;
-
-// The directions in which light flies that the camera sees, a filter's reach beyond the frame.
-DirectionCone seenDirections(const SceneFile& scene, const FrameSetup& setup) {
-  constexpr double border = 8, rounding = 1e-5;
-  DirectionCone cone;
-  cone.axis = -setup.camera->viewDirection();
-  if (setup.camera->isPanorama() || setup.motion) return cone;
-  cone.angle = rounding;
-  const Vec2d size(setup.camera->resolution());
-  const double beyond = border + scene.render.real("filter_width");
-  for (const Vec2d& corner : {Vec2d(-beyond), Vec2d(size.x + beyond, -beyond),
-                              Vec2d(-beyond, size.y + beyond), size + beyond}) {
-    const Vec3d seen = -setup.camera->ray(corner).direction;
-    cone.angle = std::max(cone.angle, std::acos(std::min(1.0, glm::dot(seen, cone.axis))));
-  }
-  cone.angle += std::atan2(setup.lens.radius, setup.lens.focusDistance) + rounding;
-  return cone;
-}
 
 // What is said about one effect.
 struct Decision {
@@ -278,7 +260,8 @@ class EffectPlan {
       return {false, "no volume has a velocity, and the camera stands still", 0.0};
     double pixels = 0;
     if (medium.isMoving())
-      pixels += medium.displacement() / m_setup.space.metersPerUnit * pixelsPerUnit();
+      pixels +=
+          medium.displacement() / m_setup.space.metersPerUnit * pixelsPerUnit(m_scene, m_setup);
     if (m_setup.motion) pixels += m_setup.motion->blur(m_setup.worldBounds);
     const std::string why = fmt::format("the {} by up to {:.2g} pixels while the shutter is open",
                                         !m_setup.motion      ? "smoke moves"
@@ -291,19 +274,6 @@ class EffectPlan {
     if (medium.isMoving()) *m_setup.medium = std::move(*m_setup.medium).held();
     m_setup.motion.reset();
     return {false, fmt::format("{}, {}", why, share(*bound)), bound};
-  }
-  // Of the nearest smoke, in any direction [pixels per scene unit].
-  double pixelsPerUnit() const {
-    const cameras::Camera& camera = *m_setup.camera;
-    const double width = camera.resolution().x;
-    const Box3d& box = m_setup.worldBounds;
-    if (!camera.hasEye())
-      return 1 / glm::length(camera.ray({1, 0}).origin - camera.ray({0, 0}).origin);
-    const Vec3d nearest = glm::clamp(camera.position(), box.min, box.max);
-    const double distance = std::max(glm::length(nearest - camera.position()), 1e-9);
-    return camera.isPanorama()
-               ? width / (2 * kPi * distance)
-               : width / (2 * std::tan(horizontalFov(m_scene.camera) * kPi / 360) * distance);
   }
   // The same for light that is seen up to so many pixels from where it would be: the picture
   // differs there by no more than its steepest step times that way along either axis.
@@ -323,52 +293,19 @@ class EffectPlan {
     if (!(fstop > 0)) return {false, "the camera is a pinhole", 0.0};
     if (m_scene.cameraType != "perspective")
       return {false, "only a perspective camera has a lens", 0.0};
-    m_setup.lens = lensOf(m_scene.camera, fstop);
+    m_setup.lens = lensOf(m_scene, m_setup);
     return {true, fmt::format("the lens blurs the smoke over up to {:.2g} pixels",
-                              widestBlur(m_setup.lens))};
+                              widestBlur(m_scene, m_setup))};
   }
 
   // A pixel is the mean of what lies within half of the widest blur.
   void depthOfField(Decision& lens) {
     if (lens.on && !isOn("depth_of_field"))
-      if (const std::optional<double> bound = affordShift(0.5 * widestBlur(m_setup.lens)))
+      if (const std::optional<double> bound = affordShift(0.5 * widestBlur(m_scene, m_setup)))
         lens = {false, fmt::format("{}, {}", lens.why, share(*bound)), bound};
     m_setup.effects.depthOfField = lens.on;
     if (!lens.on) m_setup.lens = {};
   }
-  // Focal length over twice the f-number; in focus by default: the middle of the smoke.
-  render::Lens lensOf(const ParamValues& camera, double fstop) const {
-    const double millimetres =
-        camera.given("focal_length")
-            ? camera.real("focal_length")
-            : camera.real("horizontal_aperture") / 2 / std::tan(horizontalFov(camera) * kPi / 360);
-    const double focus = camera.real("focus_distance");
-    return {millimetres / 1000 / m_setup.space.metersPerUnit / (2 * fstop),
-            focus > 0 ? focus : std::max(1e-6, along(m_setup.worldBounds.center()))};
-  }
-  double along(const Vec3d& p) const {
-    return glm::dot(p - m_setup.camera->position(), m_setup.camera->viewDirection());
-  }
-  // Diameter of the circle of confusion at the ends of the smoke [pixels].
-  double widestBlur(const render::Lens& lens) const {
-    const Box3d& box = m_setup.worldBounds;
-    if (box.empty()) return 0;
-    double nearest = 1e300, farthest = 0;
-    for (int corner = 0; corner < 8; ++corner) {
-      const double d =
-          along({corner & 1 ? box.max.x : box.min.x, corner & 2 ? box.max.y : box.min.y,
-                 corner & 4 ? box.max.z : box.min.z});
-      nearest = std::min(nearest, d);
-      farthest = std::max(farthest, d);
-    }
-    const double tanHalf = std::tan(horizontalFov(m_scene.camera) * kPi / 360);
-    const double pixels = m_setup.camera->resolution().x / (2 * tanHalf);
-    const auto blur = [&](double d) {
-      return 2 * lens.radius * pixels * std::abs(1 / std::max(d, 1e-6) - 1 / lens.focusDistance);
-    };
-    return std::max(blur(nearest), blur(farthest));
-  }
-
   void chromatic() {
     std::string coloured = m_setup.medium->isColoured() ? "extinction is coloured"
                            : m_setup.medium->isGrey()   ? ""

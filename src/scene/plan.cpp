@@ -145,7 +145,8 @@ void predict(const SceneFile& scene, const RenderRequest& request, FrameSetup& s
 
 }  // namespace
 
-FramePlan planScene(const SceneFile& scene, std::int64_t frame, const RenderRequest& request) {
+FramePlan planScene(const SceneFile& written, std::int64_t frame, const RenderRequest& request) {
+  const SceneFile scene = sceneAt(written, static_cast<double>(frame));
   SetupOptions options;
   options.resolution = request.resolution;
   options.seed = request.seed;

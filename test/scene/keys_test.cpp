@@ -278,11 +278,11 @@ TEST_F(ShotTest, MotionBlurIsPlannedFromItsPixels) {
 
   EXPECT_FALSE(setUpFrame(scene({kFlight, kTarget, "effects.motion_blur=off"}), 3).motion);
   EXPECT_FALSE(setUpFrame(scene({kFlight, kTarget, "camera.shutter=[0, 0]"}), 3).motion);
-  const FrameSetup brief = setUpFrame(scene({kFlight, kTarget, "camera.shutter=[0, 5e-4]"}), 3);
-  EXPECT_FALSE(brief.motion) << "a thousandth of a pixel";
+  const FrameSetup brief = setUpFrame(scene({kFlight, kTarget, "camera.shutter=[0, 5e-5]"}), 3);
+  EXPECT_FALSE(brief.motion) << "a ten-thousandth of a pixel";
   EXPECT_FALSE(brief.effects.motionBlur);
   EXPECT_TRUE(
-      setUpFrame(scene({kFlight, kTarget, "camera.shutter=[0, 5e-4]", "effects.motion_blur=on"}), 3)
+      setUpFrame(scene({kFlight, kTarget, "camera.shutter=[0, 5e-5]", "effects.motion_blur=on"}), 3)
           .effects.motionBlur);
   const FrameSetup still = setUpFrame(scene({"effects.motion_blur=on"}), 3);
   EXPECT_FALSE(still.effects.motionBlur) << "nothing moves";

@@ -59,7 +59,7 @@ struct FrameSetup {
   std::vector<EffectState> effectStates;
   RandomKey key;
   estimators::LightFieldLayout layout;  ///< of type `photosphere`; radius chosen where it was 0
-  std::shared_ptr<const transport::PhotonGuide> guide;  ///< null = photons are not steered
+  std::shared_ptr<const transport::PhotonGuide> guide;   ///< null = photons are not steered
   std::optional<estimators::PhotonMapLayout> photonMap;  ///< of type `photon_map`; radius chosen
   std::uint64_t photonMapPhotons = 0;                    ///< that one pass is expected to store
   /// Parts that photons and samples are shared out to where the frame's error is wanted: their
