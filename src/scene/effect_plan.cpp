@@ -4,12 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "blur.h"
 #include "light_bounds.h"
 #include "photosphere/core/error.h"
 #include "photosphere/phase/phase.h"
 #include "pre_render.h"
+#include "unseen_volumes.h"
 
 namespace photosphere::scene {
 
@@ -37,19 +39,21 @@ class EffectPlan {
 
   void decide() {
     Effects& e = m_setup.effects;
-    const bool smoke = !m_setup.medium->bounds().empty();
-    m_scatters = m_setup.medium->majorants().maximum() > 0 && m_setup.medium->maximumAlbedo() > 0;
     Decision lens = prepareLens();
-    if (smoke) m_bounds.emplace(*m_setup.medium, seenDirections(m_scene, m_setup));
-    for (const auto& light : m_setup.lights)
-      m_lamps.push_back(m_bounds ? m_bounds->lamp(*light) : LampBound{});
+    m_allLamps = m_setup.lights.size();
+    m_glowed = glows();
+    boundLight();
     e.environment = environment();
-    Decision lamps = dropDarkLamps();
-    e.emission = glows() && !isOff("emission");
-    e.singleScattering = !m_setup.lights.empty() && m_scatters && !isOff("single_scattering");
+    startWithAllThatShines();
 
     // In the order of what leaving them out saves.
     Decision multiple = multipleScattering();
+    m_multiple = multiple.on;
+    const Decision volumes = dropUnseenVolumes();
+    Decision lamps = dropDarkLamps();
+    startWithAllThatShines();
+    // Of less smoke and fewer lamps, it may fit.
+    if (multiple.on) multiple = multipleScattering();
     m_multiple = multiple.on;
     dropFaintLamps(lamps);
     Decision emission = this->emission();
@@ -72,6 +76,7 @@ class EffectPlan {
     note("depth_of_field", lens);
     note("environment", m_environment);
     note("lights", lamps);
+    note("volumes", volumes);
     directions();
   }
 
@@ -123,6 +128,58 @@ class EffectPlan {
     return *m_picture;
   }
 
+  // Of the smoke and the lamps that are left.
+  void boundLight() {
+    const transport::Medium& medium = *m_setup.medium;
+    m_scatters = medium.majorants().maximum() > 0 && medium.maximumAlbedo() > 0;
+    m_bounds.reset();
+    if (!medium.bounds().empty())
+      m_bounds.emplace(smokeBounds(medium), seenDirections(m_scene, m_setup));
+    m_lamps.clear();
+    for (const auto& light : m_setup.lights)
+      m_lamps.push_back(m_bounds ? m_bounds->lamp(*light) : LampBound{});
+  }
+
+  void startWithAllThatShines() {
+    m_setup.effects.emission = glows() && !isOff("emission");
+    m_setup.effects.singleScattering =
+        !m_setup.lights.empty() && m_scatters && !isOff("single_scattering");
+  }
+
+  // Volumes that no ray meets, and whose light and shadows do not carry over to those in view.
+  Decision dropUnseenVolumes() {
+    const std::size_t all = m_setup.medium->volumes().size();
+    if (all == 0) return {false, "there is none"};
+    if (m_forOtherViews)
+      return {true, fmt::format("{} of {}: the light is for any view", all, all)};
+    const UnseenVolumes volumes(m_scene, m_setup, seenDirections(m_scene, m_setup));
+    std::vector<bool> out = volumes.unseen();
+    const auto count = [&] { return std::count(out.begin(), out.end(), true); };
+    const auto unseen = count();
+    std::optional<double> bound;
+    while (count() > 0 && !bound) {
+      const std::vector<double> most = volumes.effects(out, m_setup.lights, m_multiple);
+      const double sum = std::accumulate(most.begin(), most.end(), 0.0);
+      bound = sum > 0 ? afford(sum) : 0.0;
+      // What acts most stays, and the others act on it too.
+      if (!bound) {
+        const auto strongest = std::max_element(most.begin(), most.end()) - most.begin();
+        out[static_cast<std::size_t>(strongest)] = false;
+      }
+    }
+    const std::string beyond = fmt::format("{} of {} out of view", unseen, all);
+    if (unseen == 0) return {true, beyond};
+    if (!bound) return {true, beyond + ": light or shadows may reach what is in view"};
+    const auto left = count();
+    leaveOut(out, m_setup);
+    boundLight();
+    return {left < static_cast<std::ptrdiff_t>(all),
+            fmt::format("{}; light and shadows of {} {}", beyond, left,
+                        *bound > 0 ? "change what is in view by " + share(*bound)
+                                   : "do not reach what is in view"),
+            bound};
+  }
+
   bool environment() {
     bool surroundings = false, shines = false;
     for (std::size_t i = 0; i < m_setup.lights.size(); ++i) {
@@ -156,7 +213,6 @@ class EffectPlan {
         dark.push_back(fmt::format("'{}'", m_setup.lights[i]->name()));
         dropLamp(i);
       }
-    m_allLamps = all;
     if (all == 0) return {false, "there is none"};
     if (dark.empty()) return {true, fmt::format("{} of {} shine on the smoke", all, all)};
     std::reverse(dark.begin(), dark.end());
@@ -236,6 +292,7 @@ class EffectPlan {
     return {false, "the smoke's glow is " + share(*bound), bound};
   }
   std::string darkEmission() const {
+    if (m_glowed) return "what emits is left out";
     for (const VolumeEntry& volume : m_scene.volumes)
       if (volume.emits) return "the emission is zero everywhere";
     return "no volume emits";
@@ -340,6 +397,7 @@ class EffectPlan {
   bool m_single;         // light scattered twice is nobody's to estimate
   bool m_scatters = false;
   bool m_multiple = true;
+  bool m_glowed = false;  // before volumes were left out
   std::size_t m_allLamps = 0;
   std::optional<LightBounds> m_bounds;  // nothing without smoke
   std::vector<LampBound> m_lamps;       // as m_setup.lights

@@ -19,6 +19,7 @@
 #include "photosphere/volume/vdb_file.h"
 #include "photosphere/volume/velocity.h"
 #include "smoke_source.h"
+#include "unseen_volumes.h"
 #include "volume_emission.h"
 
 namespace photosphere::scene {
@@ -188,11 +189,7 @@ void buildMedium(const SceneFile& scene, std::int64_t cacheFrame, bool wantParti
   }
   setup.medium = std::make_unique<transport::Medium>(std::move(placed), shutter);
   // Active voxels may hold zeros: what frames the smoke is the box of what scatters or emits.
-  setup.worldBounds = Box3d();
-  if (const Box3d& local = setup.medium->bounds(); !local.empty()) {
-    setup.worldBounds.grow(setup.space.worldFromLocal(local.min));
-    setup.worldBounds.grow(setup.space.worldFromLocal(local.max));
-  }
+  setup.worldBounds = worldBoundsOf(*setup.medium, setup.space);
   setup.readSeconds += watch.seconds();
 }
 

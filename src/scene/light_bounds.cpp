@@ -142,50 +142,76 @@ class Shells {
 
 }  // namespace
 
-double largestMeanDepth(const transport::Medium& medium) {
-  double depth = 0;
-  if (medium.isMoving()) {
+double opacityOf(double depth) {
+  return -std::expm1(-depth);
+}
+
+double brightestEmission(const transport::MediumVolume& volume) {
+  float most = 0;
+  volume::forEachNode(volume.emission.field, [&](const Vec4f& j) { most = std::max(most, j.w); });
+  return static_cast<double>(most);
+}
+
+double largestMeanDepth(const transport::MediumVolume& v, const volume::MajorantGrid& majorants,
+                        bool moves) {
+  Shells shells;
+  if (moves) {
     // Motion may draw smoke together: what holds at every time are the majorants.
-    const volume::MajorantGrid& majorants = medium.majorants();
     const Vec3d size(majorants.cellSize());
-    Shells shells;
     for (int z = 0; z < majorants.dims().z; ++z)
       for (int y = 0; y < majorants.dims().y; ++y)
         for (int x = 0; x < majorants.dims().x; ++x)
           shells.add(static_cast<double>(majorants.majorant({x, y, z})), size.x * size.y * size.z);
-    return shells.depth();
-  }
-  for (const transport::MediumVolume& v : medium.volumes()) {
-    Shells shells;
+  } else {
     const double cell = std::abs(glm::determinant(Mat3d(v.localFromNode)));
     volume::forEachCell(v.density, [&](const Vec3i&, int edge, float most) {
       shells.add(v.densityScale * static_cast<double>(most), cell * edge * edge * edge);
     });
-    depth += shells.depth();
+  }
+  return shells.depth();
+}
+
+namespace {
+
+// In a medium that moves, the majorants are those of all volumes: one stands for all.
+double sumOfMeanDepths(const transport::Medium& medium) {
+  double depth = 0;
+  for (const transport::MediumVolume& v : medium.volumes()) {
+    depth += largestMeanDepth(v, medium.majorants(), medium.isMoving());
+    if (medium.isMoving()) break;
   }
   return depth;
 }
 
-LightBounds::LightBounds(const transport::Medium& medium, const DirectionCone& view)
-    : m_phase(medium.phases()),
-      m_depths(medium.majorants()),
-      m_view(view),
-      m_sphere(transport::boundingSphere(medium)),
-      m_albedo(static_cast<double>(medium.maximumAlbedo())),
-      m_anyOpacity(-std::expm1(-m_depths.any())),
-      m_behind(4 * kPi * (m_anyOpacity < kThick ? -std::expm1(-largestMeanDepth(medium)) : 1.0)),
-      m_opacity(-m_albedo * std::expm1(-m_depths.within(view))),
-      m_rho(m_albedo * std::min(m_phase.norm() * m_anyOpacity, m_phase.maximum() * m_behind)) {
-  const transport::Emission* emission = medium.emission();
-  if (!emission) return;
-  double brightest = 0;
-  for (const transport::MediumVolume& v : medium.volumes()) {
-    float most = 0;
-    volume::forEachNode(v.emission.field, [&](const Vec4f& j) { most = std::max(most, j.w); });
-    brightest += static_cast<double>(most);
+}  // namespace
+
+SmokeBounds smokeBounds(const transport::Medium& medium) {
+  SmokeBounds smoke;
+  smoke.phases = medium.phases();
+  smoke.depths = DepthBound(medium.majorants());
+  smoke.meanDepth = opacityOf(smoke.depths.any()) < kThick ? sumOfMeanDepths(medium) : kInfinite;
+  smoke.albedo = static_cast<double>(medium.maximumAlbedo());
+  smoke.sphere = transport::boundingSphere(medium);
+  if (const transport::Emission* emission = medium.emission()) {
+    double brightest = 0;
+    for (const transport::MediumVolume& v : medium.volumes())
+      brightest += brightestEmission(v);
+    smoke.glow = brightest * glm::length(emission->region().box.extent());
   }
-  m_glow = brightest * glm::length(emission->region().box.extent());
+  return smoke;
 }
+
+LightBounds::LightBounds(const SmokeBounds& smoke, const DirectionCone& view)
+    : m_phase(smoke.phases),
+      m_depths(smoke.depths),
+      m_view(view),
+      m_sphere(smoke.sphere),
+      m_albedo(smoke.albedo),
+      m_anyOpacity(opacityOf(m_depths.any())),
+      m_behind(4 * kPi * opacityOf(smoke.meanDepth)),
+      m_opacity(m_albedo * opacityOf(m_depths.within(view))),
+      m_rho(m_albedo * std::min(m_phase.norm() * m_anyOpacity, m_phase.maximum() * m_behind)),
+      m_glow(smoke.glow) {}
 
 double LightBounds::scatteredGlow() const {
   const double all = product(m_opacity * m_phase.norm(), m_glow);
@@ -204,9 +230,8 @@ double LightBounds::scatteredAgain(const lights::Reach& reach, double alpha, dou
                   product(m_rho * m_phase.norm(), reach.radiance));
 }
 
-LampBound LightBounds::lamp(const lights::Light& light) const {
+LampBound LightBounds::of(const lights::Reach& reach) const {
   LampBound bound;
-  const lights::Reach reach = light.reach(m_sphere);
   bound.background = reach.background;
   if (!(reach.fluence > 0)) return bound;
   const double alpha = angleOf(reach.oneMinusCos);
@@ -217,7 +242,8 @@ LampBound LightBounds::lamp(const lights::Light& light) const {
   const double around = product(m_opacity, scatteredAgain(reach, alpha, 0.0));
   bound.multiple =
       around > 0 ? (m_rho < 1 ? toward + around * m_rho / (1 - m_rho) : kInfinite) : toward;
-  bound.shadow = -std::expm1(-m_depths.within({reach.axis, alpha}));
+  bound.multiple = std::min(bound.multiple, product(m_opacity, reach.radiance));
+  bound.shadow = opacityOf(m_depths.within({reach.axis, alpha}));
   return bound;
 }
 

@@ -25,7 +25,9 @@
 //   around it (Hardy, Littlewood & Polya 1952, theorem 378, in space): sum of sigma dr over shells.
 //   Every further event multiplies S by no more than rho = A p, p = min(N (1 - exp(-tau_any)),
 //   4 pi F (1 - exp(-D))), so that all light scattered twice and more is at most
-//     A (1 - exp(-tau_view)) (S1 toward the eye + S1 in any direction * rho / (1 - rho)).
+//     A (1 - exp(-tau_view)) (S1 toward the eye + S1 in any direction * rho / (1 - rho)),
+//   and, of light of radiance R, at most A (1 - exp(-tau_view)) R: nowhere is it brighter than
+//   where it comes from.
 // Glow of radiance G along any line: seen <= G, scattered <= A (1 - exp(-tau_view)) N G / (1 -
 // rho).
 
@@ -65,16 +67,38 @@ struct DirectionCone {
 /// cells in one of their cells at least, over the layer's thickness over its direction's cosine.
 class DepthBound {
  public:
+  DepthBound() = default;
   explicit DepthBound(const volume::MajorantGrid& majorants);
   double any() const;
   double within(const DirectionCone& cone) const;
+  /// Of both together.
+  DepthBound& operator+=(const DepthBound& other) {
+    m_layers += other.m_layers;
+    return *this;
+  }
 
  private:
   Vec3d m_layers{0.0};  // sum over layers across each axis
 };
 
-/// D above: no point sees more smoke in the mean over all directions.
-double largestMeanDepth(const transport::Medium& medium);
+/// What the bounds go by.
+struct SmokeBounds {
+  std::vector<phase::PhaseFunction> phases;
+  DepthBound depths;
+  double meanDepth = 0;  ///< D above: no point sees more smoke in the mean over all directions
+  double albedo = 0;     ///< A above
+  double glow = 0;       ///< radiance of its emission along any line [W m^-2 sr^-1]
+  lights::BoundingSphere sphere;  ///< local space [m]
+};
+SmokeBounds smokeBounds(const transport::Medium& medium);
+
+/// D of one volume of a medium. @param majorants  of it alone, at every time
+double largestMeanDepth(const transport::MediumVolume& volume,
+                        const volume::MajorantGrid& majorants, bool moves);
+/// Most that a volume emits anywhere, in any channel [W m^-3 sr^-1].
+double brightestEmission(const transport::MediumVolume& volume);
+/// 1 - exp(-depth).
+double opacityOf(double depth);
 
 /// What one lamp adds to any pixel at most [W m^-2 sr^-1], largest channel.
 struct LampBound {
@@ -87,9 +111,11 @@ struct LampBound {
 class LightBounds {
  public:
   /// @param view  directions in which light flies that the camera sees
-  LightBounds(const transport::Medium& medium, const DirectionCone& view);
+  LightBounds(const SmokeBounds& smoke, const DirectionCone& view);
 
-  LampBound lamp(const lights::Light& light) const;
+  LampBound lamp(const lights::Light& light) const { return of(light.reach(m_sphere)); }
+  /// Of light that comes to the smoke, wherever it is from.
+  LampBound of(const lights::Reach& reach) const;
   /// Of the medium's emission [W m^-2 sr^-1]: as it is seen, and what it lights.
   double glow() const { return m_glow; }
   double scatteredGlow() const;
