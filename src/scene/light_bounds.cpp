@@ -210,11 +210,11 @@ LightBounds::LightBounds(const SmokeBounds& smoke, const DirectionCone& view)
       m_anyOpacity(opacityOf(m_depths.any())),
       m_behind(4 * kPi * opacityOf(smoke.meanDepth)),
       m_opacity(m_albedo * opacityOf(m_depths.within(view))),
-      m_rho(m_albedo * std::min(m_phase.norm() * m_anyOpacity, m_phase.maximum() * m_behind)),
+      m_rho(m_albedo * std::min(m_anyOpacity, m_phase.maximum() * m_behind)),
       m_glow(smoke.glow) {}
 
 double LightBounds::scatteredGlow() const {
-  const double all = product(m_opacity * m_phase.norm(), m_glow);
+  const double all = product(m_opacity, m_glow);
   return all > 0 ? (m_rho < 1 ? all / (1 - m_rho) : kInfinite) : 0.0;
 }
 
@@ -224,10 +224,10 @@ double LightBounds::scatteredAgain(const lights::Reach& reach, double alpha, dou
   const double inFront =
       m_anyOpacity *
       std::min(m_phase.beyond(0.5 * apart) * m_phase.widenedNorm(alpha) + half * m_phase.norm(),
-               most * m_phase.norm());
+               most);
   const double behind = m_behind * most * half;
   return std::min(product(m_albedo * std::min(inFront, behind), reach.fluence),
-                  product(m_rho * m_phase.norm(), reach.radiance));
+                  product(m_rho, reach.radiance));
 }
 
 LampBound LightBounds::of(const lights::Reach& reach) const {
@@ -236,7 +236,7 @@ LampBound LightBounds::of(const lights::Reach& reach) const {
   if (!(reach.fluence > 0)) return bound;
   const double alpha = angleOf(reach.oneMinusCos);
   const double apart = std::max(0.0, angleBetween(reach.axis, m_view.axis) - m_view.angle);
-  bound.single = std::min(product(m_opacity * m_phase.norm(), reach.radiance),
+  bound.single = std::min(product(m_opacity, reach.radiance),
                           product(m_opacity * m_phase.beyond(apart - alpha), reach.fluence));
   const double toward = product(m_opacity, scatteredAgain(reach, alpha, apart));
   const double around = product(m_opacity, scatteredAgain(reach, alpha, 0.0));

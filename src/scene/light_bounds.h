@@ -10,25 +10,27 @@
 // eye flies within beta of another, the angle between the two is at least x + beta. Leaving out
 // extinction on the way in, and with the integral of T sigma_s along a line <= A (1 - exp(-tau)):
 //
-//   scattered once     L1 <= A (1 - exp(-tau)) min(N R, E f(>x - alpha)).
+//   scattered once     L1 <= A (1 - exp(-tau)) min(R, E f(>x - alpha)):
+// what scatters at a point is a mixture of the phase functions, which integrates to one, so that it
+// makes of radiance up to R no more than R.
 //   scattered again, per scattering coefficient of the place: S1 = integral of f(w', wo) L1(w')
 //   dw',
 //     (a) tau_any in front: the angle between lamp and eye is at least x, so w' is at least x/2
 //     away
 //         from one of the two:  A (1 - exp(-tau_any)) E (f(>x/2) N_alpha + f(>x/2 - alpha) N),
-//         N_alpha the integral of f widened by alpha; or, by the phase function's maximum, E F N
+//         N_alpha the integral of f widened by alpha; or, by the phase function's maximum, E F
 //     (b) f in front, 4 pi times the mean over directions of 1 - exp(-tau) behind:
 //         A 4 pi (1 - exp(-D)) E F f(>x/2 - alpha)
-//     (c) of lamps with extent: rho N R,  rho = A p as below
+//     (c) of lamps with extent: rho R,  rho = A p as below
 //   D: the mean over directions of the optical depth from a point, 1/(4 pi) integral of
 //   sigma_t / r^2 dV, is largest when the smoke is rearranged to a ball that gets thinner outward
 //   around it (Hardy, Littlewood & Polya 1952, theorem 378, in space): sum of sigma dr over shells.
-//   Every further event multiplies S by no more than rho = A p, p = min(N (1 - exp(-tau_any)),
+//   Every further event multiplies S by no more than rho = A p, p = min(1 - exp(-tau_any),
 //   4 pi F (1 - exp(-D))), so that all light scattered twice and more is at most
 //     A (1 - exp(-tau_view)) (S1 toward the eye + S1 in any direction * rho / (1 - rho)),
 //   and, of light of radiance R, at most A (1 - exp(-tau_view)) R: nowhere is it brighter than
 //   where it comes from.
-// Glow of radiance G along any line: seen <= G, scattered <= A (1 - exp(-tau_view)) N G / (1 -
+// Glow of radiance G along any line: seen <= G, scattered <= A (1 - exp(-tau_view)) G / (1 -
 // rho).
 
 #include <array>

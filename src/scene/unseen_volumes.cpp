@@ -28,6 +28,11 @@ Box3d aroundRounding(const Box3d& box) {
   return volume::widened(box, kSlack * (glm::length(box.extent()) + glm::length(box.center())));
 }
 
+// Farthest that it moves while the shutter is open [m].
+double displacement(const transport::Medium& medium, const transport::MediumVolume& v) {
+  return v.motion.velocity.empty() ? 0.0 : v.motion.fastest * medium.shutter().longest();
+}
+
 // Of all that a volume has, wherever it moves.
 Box3d boxOf(const transport::Medium& medium, const transport::MediumVolume& v) {
   if (medium.volumes().size() == 1) return aroundRounding(medium.bounds());
@@ -37,14 +42,37 @@ Box3d boxOf(const transport::Medium& medium, const transport::MediumVolume& v) {
     box.grow(glow.min);
     box.grow(glow.max);
   }
-  const double reach =
-      v.motion.velocity.empty() ? 0.0 : v.motion.fastest * medium.shutter().longest();
-  return aroundRounding(volume::widened(box, reach));
+  return aroundRounding(volume::widened(box, displacement(medium, v)));
 }
 
 lights::BoundingSphere sphereOf(const Box3d& box) {
   if (box.empty()) return {Vec3d(0.0), 0.0};
   return {box.center(), 0.5 * glm::length(box.extent()) * (1 + kSlack)};
+}
+
+// Farthest from a point that a field has anything but zero [m].
+template <class T>
+double farthestFrom(const Vec3d& point, const volume::BrickField<T>& field,
+                    const Mat4d& localFromNode) {
+  const Mat3d linear(localFromNode);
+  const double half =
+      0.5 * (glm::length(linear[0]) + glm::length(linear[1]) + glm::length(linear[2]));
+  double farthest = 0;
+  volume::forEachCell(field, [&](const Vec3i& cell, int edge, float) {
+    const Vec3d center = transformPoint(localFromNode, Vec3d(cell) + 0.5 * edge);
+    farthest = std::max(farthest, glm::length(center - point) + half * edge);
+  });
+  return farthest;
+}
+
+// About the middle of the box, no larger than the volume needs.
+lights::BoundingSphere sphereOf(const transport::MediumVolume& v, const Box3d& box, double reach) {
+  lights::BoundingSphere sphere = sphereOf(box);
+  const double farthest =
+      std::max(farthestFrom(sphere.center, v.density, v.localFromNode),
+               farthestFrom(sphere.center, v.emission.field, v.emission.localFromNode));
+  sphere.radius = std::min(sphere.radius, (farthest + reach) * (1 + kSlack));
+  return sphere;
 }
 
 double distanceBetween(const Box3d& a, const Box3d& b) {
@@ -192,13 +220,12 @@ UnseenVolumes::Part UnseenVolumes::makePart(const transport::Medium& medium,
                                             const transport::LightList& lights) {
   Part part;
   part.box = boxOf(medium, v);
-  part.smoke.sphere = sphereOf(part.box);
+  const double reach = displacement(medium, v);
+  part.smoke.sphere = sphereOf(v, part.box, reach);
   part.smoke.phases = {v.phase};
   part.smoke.albedo =
       static_cast<double>(v.albedoFields.empty() ? glm::clamp(maxComponent(v.albedo), 0.0f, 1.0f)
                                                  : medium.maximumAlbedo());
-  const double reach =
-      v.motion.velocity.empty() ? 0.0 : v.motion.fastest * medium.shutter().longest();
   const bool moves = reach > 0;
   const volume::MajorantSource source{&v.density, v.localFromNode, v.densityScale, reach};
   const volume::MajorantGrid majorants({&source, 1});
@@ -246,6 +273,11 @@ UnseenVolumes::Rest UnseenVolumes::restWithout(const std::vector<bool>& out,
     add(m_parts[i].smoke, rest.smoke);
   }
   rest.smoke.sphere = sphereOf(rest.box);
+  double needed = 0;
+  for (const Part* r : rest.parts)
+    needed = std::max(needed, glm::length(r->smoke.sphere.center - rest.smoke.sphere.center) +
+                                  r->smoke.sphere.radius);
+  rest.smoke.sphere.radius = std::min(rest.smoke.sphere.radius, needed * (1 + kSlack));
   for (const auto& light : lights)
     rest.lamps.push_back(light->reach(rest.smoke.sphere));
   return rest;
