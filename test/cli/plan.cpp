@@ -48,7 +48,7 @@ TEST_F(Plan, SaysEffectsBoundsSecondsAndMemory) {
   ASSERT_EQ(plan.exitCode, 0) << plan.err;
   for (const char* word : {"emission", "single_scattering", "multiple_scattering", "shadows",
                            "chromatic", "motion_blur", "depth_of_field", "environment", "lights",
-                           "directions", "bound", "no light of 'astray' reaches it",
+                           "directions", "volumes", "bound", "no light of 'astray' reaches it",
                            "predicted seconds", "trace", "march", "predicted memory"})
     EXPECT_NE(plan.out.find(word), std::string::npos) << word << '\n' << plan.out;
   EXPECT_EQ(namesIn(m_folder.path()),
