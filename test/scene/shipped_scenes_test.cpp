@@ -63,6 +63,9 @@ TEST(ShippedScenes, ShowTheEffectThatTheyAreNamedAfter) {
       {"emission", &Effects::emission},
       {"environment", &Effects::environment},
       {"depth_of_field", &Effects::depthOfField},
+      {"motion_blur", &Effects::motionBlur},
+      {"camera_motion", &Effects::motionBlur},
+      {"chromatic", &Effects::chromatic},
   };
   for (const auto& [name, flag] : shown) {
     const SceneFile scene = loadScene(projectFile(fmt::format("data/scenes/{}.toml", name)));
