@@ -119,10 +119,11 @@ class MarchIntegrator final : public Integrator {
           if (t1 == ray.length) break;
           continue;
         }
-        const float sigma = extinction(0.5f * (t0 + t1));
+        Vec3f carrier(0.0f);  // read where smoke moves
+        const float sigma = extinctionAt(extinction, ray, 0.5f * (t0 + t1), when, carrier);
         if (sigma > 0.0f)
-          transmittance =
-              step({ray, t0, t1}, sigma, when, transmittance, opacity, result, rng, counters);
+          transmittance = step({ray, t0, t1}, sigma, carrier, when, transmittance, opacity, result,
+                               rng, counters);
         else if (m_emission)
           result.emission +=
               transmittance * (t1 - t0) *
@@ -135,9 +136,19 @@ class MarchIntegrator final : public Integrator {
     return transmittance;
   }
 
-  // A step through extinction.
-  Light step(const MarchStep& step, float sigma, When when, const Light& transmittance,
-             RayOpacity* opacity, RayRadiance& result, Rng& rng,
+  template <class Along>
+  static float extinctionAt(const Along& along, const Segment&, float t, transport::Still, Vec3f&) {
+    return along(t);
+  }
+  template <class Along>
+  float extinctionAt(const Along&, const Segment& ray, float t, transport::Moment when,
+                     Vec3f& carrier) const {
+    return m_medium.extinction(ray.origin + ray.direction * t, when, carrier);
+  }
+
+  // A step through extinction. @param carrier  Medium::carrierOf its middle, where smoke moves
+  Light step(const MarchStep& step, float sigma, const Vec3f& carrier, When when,
+             const Light& transmittance, RayOpacity* opacity, RayRadiance& result, Rng& rng,
              IntegratorCounters& counters) const {
     const Segment& ray = step.ray;
     const float dx = step.t1 - step.t0;
@@ -163,7 +174,8 @@ class MarchIntegrator final : public Integrator {
     if (m_options.effects.singleScattering)
       result.single += weight * m_direct.at<Light>(p, wo, c, &step, rng, counters, when);
     if (m_source && !(m_gather && !m_source->carriesUnscattered())) {
-      const estimators::Inscatter in = m_source->at(m_medium.carrierOf(p, when), wo, c);
+      const estimators::Inscatter in =
+          m_source->at(std::is_same_v<When, transport::Still> ? p : carrier, wo, c);
       result.single += weight * in.single;
       result.multiple += weight * in.multiple;
     }

@@ -10,7 +10,7 @@ namespace {
 
 // Steering costs a few hundredths of a second and the splitting of photons. It pays where less than
 // these parts of the smoke are in the frame, or of the lamps' light meet smoke (README.md).
-constexpr double kVisible = 0.5, kHitting = 0.25;
+constexpr double kVisible = 0.5, kHitting = 0.2;
 
 // True when light is read only where the camera's own rays pass.
 bool readAlongRays(const SceneFile& scene, const FrameSetup& setup) {

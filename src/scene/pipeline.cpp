@@ -116,7 +116,7 @@ FrameResult renderScene(const SceneFile& written, std::int64_t frame,
 
   const Stopwatch aiming;
   aimLight(scene, crop, setup);
-  result.statistics.seconds.trace += aiming.seconds();
+  if (setup.guide) result.statistics.seconds.trace += aiming.seconds();
   checkMemory(setup, storesLight(scene, setup) && scene.estimator.text("cache").empty());
   renderBatches(scene, request, crop, total, setup, result);
   result.notes = setup.notes;

@@ -263,7 +263,7 @@ std::span<const Param> estimatorParams() {
        .unit = "",
        .defaultText = "auto",
        .help = "photons where the picture gains from them, found by paths from the camera; auto = "
-               "where less than half of the smoke is in the frame, or less than a quarter of the "
+               "where less than half of the smoke is in the frame, or less than a fifth of the "
                "lamps' light meets smoke",
        .choices = "auto|on|off"},
       {.name = "light_voxel",

@@ -147,6 +147,28 @@ float Medium::extinction(const Vec3f& p, Moment when) const {
   return sum;
 }
 
+float Medium::extinction(const Vec3f& p, Moment when, Vec3f& carrier) const {
+  if (m_placed.size() == 1) {
+    const Placed& only = m_placed.front();
+    carrier = rest(0, p, when);
+    return only.scale * only.field->sample(only.nodeFromLocal(carrier));
+  }
+  Vec3f sum(0.0f);
+  float extinction = 0.0f, weights = 0.0f;
+  for (std::size_t i = 0; i < m_placed.size(); ++i) {
+    const Vec3f at = rest(i, p, when);
+    const Placed& v = m_placed[i];
+    const float density = v.field->sample(v.nodeFromLocal(at));
+    // Where there is no smoke, what is stored is not read: any place between theirs will do.
+    const float weight = v.scale * (density + 1e-6f);
+    extinction += v.scale * density;
+    sum += weight * at;
+    weights += weight;
+  }
+  carrier = weights > 0.0f ? sum / weights : p;
+  return extinction;
+}
+
 template <class When>
 Rgb Medium::channelSum(const Vec3f& p, When when) const {
   Rgb sum(0.0f);
@@ -162,17 +184,9 @@ template Rgb Medium::channelSum(const Vec3f&, Moment) const;
 
 Vec3f Medium::carrierOf(const Vec3f& p, Moment when) const {
   if (m_placed.size() == 1) return rest(0, p, when);
-  Vec3f sum(0.0f);
-  float weights = 0.0f;
-  for (std::size_t i = 0; i < m_placed.size(); ++i) {
-    const Vec3f at = rest(i, p, when);
-    const Placed& v = m_placed[i];
-    // Where there is no smoke, what is stored is not read: any place between theirs will do.
-    const float weight = v.scale * (v.field->sample(v.nodeFromLocal(at)) + 1e-6f);
-    sum += weight * at;
-    weights += weight;
-  }
-  return weights > 0.0f ? sum / weights : p;
+  Vec3f carrier;
+  extinction(p, when, carrier);
+  return carrier;
 }
 
 Rgb Medium::emitted(const Vec3f& p, Moment when) const {

@@ -82,6 +82,32 @@ TEST(ColouredSmoke, OfTwoColoursAgreesWithPathTracing) {
   expectAgreement("two colours", sceneOf(std::move(volumes)), 3, 0.025, 0.025);
 }
 
+// In surroundings of 1, smoke of albedo 1 is seen as nothing in every channel.
+TEST(ColouredSmoke, WhiteFurnaceIsOneInEveryChannel) {
+  MediumVolume v =
+      sampledVolume(1.0, 48, {.albedo = 1.0, .g = 0.4, .extinction = 20.0}, plumeDensity);
+  v.tint = Rgb(0.15f, 0.5f, 1.0f);
+  TestScene scene = sceneOf(std::move(v));
+  scene.lights.clear();
+  scene.lights.push_back(makeLight("environment", {}));
+  LightFieldLayout layout;
+  layout.channels = 3;
+  layout.unscattered = true;
+  const PhotosphereFrame frame =
+      renderPhotosphere(scene, layout, kSanitized ? 20'000 : 2'000'000, 5);
+  EXPECT_EQ(frame.layers.nanSamples + frame.layers.negativeSamples, 0u);
+  if (kSanitized) return;
+  for (int c = 0; c < 3; ++c) {
+    std::vector<Rgb> channel;
+    for (const Rgb& pixel : frame.layers.beauty)
+      channel.emplace_back(pixel[c]);
+    const BlockDeviation off = deviationFromOne(channel, 48, 8);
+    std::printf("  channel %d: mean %.5f, worst block off by %.4f\n", c, off.mean, off.worst);
+    EXPECT_NEAR(off.mean, 1.0, 0.005) << "channel " << c;
+    EXPECT_LT(off.worst, 0.04) << "channel " << c;
+  }
+}
+
 TEST(MovingSmoke, AgreesWithPathTracing) {
   if (kSanitized) GTEST_SKIP() << "a mean of many paths, too slow under a sanitizer";
   // Eight voxels while the shutter is open, and a turn.

@@ -76,6 +76,7 @@ const KeyCase kKeys[] = {
     {"estimator", "bandwidth", "0.5"},
     {"estimator", "truncation", "3.0"},
     {"estimator", "directions", "128"},
+    {"estimator", "importance", "\"auto\""},
     {"estimator", "light_voxel", "2.0"},
     {"estimator", "cache", "\"\""},
     {"estimator", "order", "4"},

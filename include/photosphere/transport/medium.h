@@ -87,6 +87,8 @@ class Medium {
     return first.scale * first.field->sample(first.nodeFromLocal(p)) + others(p);
   }
   float extinction(const Vec3f& p, Moment when) const;
+  /// The same, and `carrierOf` of the place in `carrier`, for little more than one of the two.
+  float extinction(const Vec3f& p, Moment when, Vec3f& carrier) const;
   /// sigma_t of each channel [1/m], where `extinction` gave `sum` at the same place and time.
   template <class When>
   Rgb channels(const Vec3f& p, float sum, When when) const {
