@@ -30,7 +30,7 @@ namespace {
 // from eight is about a half, but the mean of it over pixels is far better.
 constexpr int kErrorBatches = 8;
 // Voxels that a velocity is carried on beyond those that the cache has.
-constexpr double kMostMargin = 48;
+constexpr double kMostMargin = 24;
 
 Mat4d localFromWorld(const lights::LocalSpace& space) {
   Mat4d m(space.metersPerUnit);
@@ -85,7 +85,8 @@ void setExtinction(const VolumeEntry& entry, transport::MediumVolume& placed) {
 
 // Velocity in local space, wide enough for all that moves while the shutter is open.
 transport::VolumeMotion placeMotion(const VolumeSource& source, const lights::LocalSpace& space,
-                                    const transport::Shutter& shutter, std::uint64_t budget) {
+                                    const transport::Shutter& shutter, std::uint64_t budget,
+                                    std::vector<std::string>& notes) {
   transport::VolumeMotion motion;
   if (!source.velocity || !(shutter.longest() > 0)) return motion;
   const Mat3d linear(localFromWorld(space) * source.worldFromFile);
@@ -95,6 +96,12 @@ transport::VolumeMotion placeMotion(const VolumeSource& source, const lights::Lo
       std::max({glm::length(linear[0]), glm::length(linear[1]), glm::length(linear[2])});
   const double voxels = raw * longest * shutter.longest() / volume::finestSpacing(localFromIndex);
   const int margin = static_cast<int>(std::min(std::ceil(voxels) + 1, kMostMargin));
+  if (voxels > kMostMargin)
+    notes.push_back(fmt::format(
+        "{}: the fastest of '{}' moves {:.3g} voxels while the shutter is open on one side of the "
+        "frame; smoke that goes farther than {} voxels beyond the cache's is lost. Velocities are "
+        "scene units a second: convert --velocity-scale brings those of a solver there",
+        source.path, source.velocity.name(), voxels, kMostMargin));
   const volume::Grid grid =
       volume::velocityForLookups(source.velocity, linear, margin, source.path);
   motion.velocity = volume::vectorBricksFromGrid(grid, source.path, budget);
@@ -184,7 +191,8 @@ void buildMedium(const SceneFile& scene, std::int64_t cacheFrame, bool wantParti
       placed.back().emission =
           placeEmission(scene.volumes[i], sources[i], localFromWorld(setup.space),
                         scene.output.text("colorspace"), setup.memoryBudget, setup.notes);
-    placed.back().motion = placeMotion(sources[i], setup.space, shutter, setup.memoryBudget);
+    placed.back().motion =
+        placeMotion(sources[i], setup.space, shutter, setup.memoryBudget, setup.notes);
     if (placed.back().density.empty() && placed.back().emission.field.empty()) placed.pop_back();
   }
   setup.medium = std::make_unique<transport::Medium>(std::move(placed), shutter);

@@ -75,6 +75,14 @@ void checkTable(const Vec3d& bricks) {
         bricks.x * 8, bricks.y * 8, bricks.z * 8));
 }
 
+void markBox(const Vec3d& low, const Vec3d& high, Marks& marks) {
+  const Vec3i first(glm::floor(low)), last(glm::floor(high));
+  for (int z = first.z; z <= last.z; ++z)
+    for (int y = first.y; y <= last.y; ++y)
+      for (int x = first.x; x <= last.x; ++x)
+        marks.mark({x, y, z});
+}
+
 // Marks every lattice voxel that a cell with extinction overlaps.
 void markSupport(const Medium& medium, const Vec3d& origin, double edge, Marks& marks) {
   for (const MediumVolume& v : medium.volumes()) {
@@ -82,17 +90,28 @@ void markSupport(const Medium& medium, const Vec3d& origin, double edge, Marks& 
     if (field.empty() || !(v.densityScale > 0)) continue;
     const Mat4d& m = v.localFromNode;
     const Vec3d axes = glm::abs(Vec3d(m[0])) + glm::abs(Vec3d(m[1])) + glm::abs(Vec3d(m[2]));
-    const double reach = v.motion.fastest * medium.shutter().longest() / edge;
     volume::forEachCell(field, [&](const Vec3i& cell, int size, float) {
       const Vec3d center = (transformPoint(m, Vec3d(cell) + 0.5 * size) - origin) / edge;
-      const Vec3d half = axes * (0.5 * size / edge) * (1 - 1e-6) + reach;
-      const Vec3i lo = Vec3i(glm::floor(center - half)), hi = Vec3i(glm::floor(center + half));
-      for (int z = lo.z; z <= hi.z; ++z)
-        for (int y = lo.y; y <= hi.y; ++y)
-          for (int x = lo.x; x <= hi.x; ++x)
-            marks.mark({x, y, z});
+      const Vec3d half = axes * (0.5 * size / edge) * (1 - 1e-6);
+      markBox(center - half, center + half, marks);
     });
   }
+}
+
+// The same over the shutter: where the majorants know that smoke may come.
+void markWays(const Medium& medium, const Vec3d& origin, double edge, Marks& marks) {
+  const volume::MajorantGrid& cells = medium.majorants();
+  const Vec3d size(cells.cellSize());
+  Vec3i c(0);
+  for (c.z = 0; c.z < cells.dims().z; ++c.z)
+    for (c.y = 0; c.y < cells.dims().y; ++c.y)
+      for (c.x = 0; c.x < cells.dims().x; ++c.x) {
+        if (!(cells.majorant(c) > 0.0f)) continue;
+        const Vec3d low = (cells.bounds().min + Vec3d(c) * size - origin) / edge;
+        // The last cell of a row may end beyond the smoke.
+        const Vec3d high = glm::min(low + size / edge, (cells.bounds().max - origin) / edge) - 1e-6;
+        markBox(low + 1e-6, high, marks);
+      }
 }
 
 }  // namespace
@@ -110,7 +129,10 @@ SupportLattice::SupportLattice(const Medium& medium, double edge, int margin,
   checkTable(bricks);
   m_bricks = Vec3i(bricks);
   Marks base(m_bricks);
-  markSupport(medium, m_origin, edge, base);
+  if (medium.isMoving())
+    markWays(medium, m_origin, edge, base);
+  else
+    markSupport(medium, m_origin, edge, base);
   Marks dilated(m_bricks);
   base.forEach([&](const Vec3i& v) {
     bool inside = true;  // all neighbours marked: they dilate for this voxel

@@ -1,7 +1,6 @@
 #include "photosphere/volume/velocity.h"
 
 #include <fmt/format.h>
-#include <openvdb/tools/Morphology.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,6 +9,7 @@
 
 #include "openvdb_grid.h"
 #include "photosphere/core/error.h"
+#include "photosphere/core/interrupt.h"
 #include "splats.h"
 
 namespace photosphere::volume {
@@ -56,30 +56,43 @@ Vectors::Ptr copyVectors(const Grid& grid, const Mat3d& linear, const std::strin
   return out;
 }
 
+using Front = std::vector<Coord>;
+
+template <class Visit>
+void forEachNeighbour(const Coord& at, const Visit& visit) {
+  for (int i = 0; i < 27; ++i)
+    if (i != 13) visit(at.offsetBy(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1));
+}
+
 // One layer of voxels around what is active, each the mean of its active neighbours.
-void extend(Vectors& grid) {
-  const openvdb::MaskTree before(grid.tree(), false, true, openvdb::TopologyCopy());
-  openvdb::tools::dilateActiveValues(grid.tree(), 1, openvdb::tools::NN_FACE_EDGE_VERTEX,
-                                     openvdb::tools::EXPAND_TILES);
-  const openvdb::tree::ValueAccessor<const openvdb::MaskTree> old(before);
-  const auto values = std::as_const(grid).getConstAccessor();
-  std::vector<std::pair<Coord, openvdb::Vec3f>> fresh;
-  for (auto it = grid.cbeginValueOn(); it; ++it) {
-    const Coord at = it.getCoord();
-    if (old.isValueOn(at)) continue;
+// @param front  voxels that may have an inactive neighbour; then, the new layer
+void extend(Vectors& grid, Front& front) {
+  openvdb::MaskTree fresh;
+  auto isOn = grid.getConstAccessor();
+  {
+    openvdb::tree::ValueAccessor<openvdb::MaskTree> mark(fresh);
+    for (const Coord& at : front)
+      forEachNeighbour(at, [&](const Coord& next) {
+        if (!isOn.isValueOn(next)) mark.setValueOn(next);
+      });
+  }
+  std::vector<openvdb::Vec3f> values;
+  front.clear();
+  for (auto it = fresh.cbeginValueOn(); it; ++it) {
     openvdb::Vec3f sum(0);
     float count = 0;
-    for (int i = 0; i < 27; ++i) {
-      const Coord next = at.offsetBy(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
-      if (!old.isValueOn(next)) continue;
-      sum += values.getValue(next);
+    forEachNeighbour(it.getCoord(), [&](const Coord& next) {
+      openvdb::Vec3f v;
+      if (!isOn.probeValue(next, v)) return;
+      sum += v;
       count += 1;
-    }
-    fresh.emplace_back(at, count > 0 ? sum / count : openvdb::Vec3f(0));
+    });
+    front.push_back(it.getCoord());
+    values.push_back(sum / count);
   }
   auto write = grid.getAccessor();
-  for (const auto& [at, v] : fresh)
-    write.setValueOn(at, v);
+  for (std::size_t i = 0; i < front.size(); ++i)
+    write.setValueOn(front[i], values[i]);
 }
 
 }  // namespace
@@ -88,8 +101,14 @@ Grid velocityForLookups(const Grid& grid, const Mat3d& linear, int margin,
                         const std::string& path) {
   initializeOpenVdb();
   const Vectors::Ptr vectors = copyVectors(grid, linear, path);
-  for (int i = 0; i < margin && !vectors->empty(); ++i)
-    extend(*vectors);
+  Front front;
+  if (margin > 0)
+    for (auto it = vectors->cbeginValueOn(); it; ++it)
+      front.push_back(it.getCoord());
+  for (int i = 0; i < margin && !front.empty(); ++i) {
+    throwIfInterrupted();
+    extend(*vectors, front);
+  }
   vectors->setTransform(grid.base()->transform().copy());
   vectors->setName(grid.name());
   return Grid(vectors);
