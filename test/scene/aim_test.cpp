@@ -104,10 +104,10 @@ TEST_F(AimScene, SteeringLowersTheNoiseOfACloseUp) {
 TEST_F(AimScene, AutoSteersWhereMuchIsNotSeen) {
   EXPECT_FALSE(steered(renderScene(make({}), 1)));
   EXPECT_TRUE(steered(renderScene(make(closeUp("auto")), 1)));
-  EXPECT_TRUE(steered(
-      renderScene(make({"light=[{ type = \"spot\", position = [3, 4, 2], target = [1.52, -1.14, 0], "
-                        "intensity = 100, cone_angle = 8 }]"}),
-                  1)));
+  EXPECT_TRUE(steered(renderScene(
+      make({"light=[{ type = \"spot\", position = [3, 4, 2], target = [1.52, -1.14, 0], "
+            "intensity = 100, cone_angle = 8 }]"}),
+      1)));
 }
 
 // Light voxels beyond the frame are not stored, which changes no pixel.

@@ -60,12 +60,9 @@ INSTANTIATE_TEST_SUITE_P(Data, ShippedScene, ::testing::ValuesIn(shippedScenes()
 // What each scene is there to show is on.
 TEST(ShippedScenes, ShowTheEffectThatTheyAreNamedAfter) {
   const std::pair<const char*, bool Effects::*> shown[] = {
-      {"emission", &Effects::emission},
-      {"environment", &Effects::environment},
-      {"depth_of_field", &Effects::depthOfField},
-      {"motion_blur", &Effects::motionBlur},
-      {"camera_motion", &Effects::motionBlur},
-      {"chromatic", &Effects::chromatic},
+      {"emission", &Effects::emission},           {"environment", &Effects::environment},
+      {"depth_of_field", &Effects::depthOfField}, {"motion_blur", &Effects::motionBlur},
+      {"camera_motion", &Effects::motionBlur},    {"chromatic", &Effects::chromatic},
   };
   for (const auto& [name, flag] : shown) {
     const SceneFile scene = loadScene(projectFile(fmt::format("data/scenes/{}.toml", name)));
