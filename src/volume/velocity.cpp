@@ -19,40 +19,53 @@ namespace {
 using Vectors = openvdb::Vec3SGrid;
 using openvdb::Coord;
 
-// Active voxels one by one: a tile of one velocity is rare and small beside the smoke.
-Vectors::Ptr copyVectors(const Grid& grid, const Mat3d& linear, const std::string& path) {
+// The vectors of any grid as floats, active voxels one by one: a tile of one velocity is rare and
+// small beside the smoke.
+Vectors::Ptr floatVectors(const Grid& grid, const std::string& path) {
   auto out = Vectors::create(openvdb::Vec3f(0));
-  const auto copy = [&](const auto& typed) {
-    const auto from = typed.deepCopy();
-    from->tree().voxelizeActiveTiles();
-    const bool staggered = typed.getGridClass() == openvdb::GRID_STAGGERED;
-    auto read = from->getConstAccessor();
-    auto write = out->getAccessor();
-    for (auto it = from->cbeginValueOn(); it; ++it) {
-      const Coord at = it.getCoord();
-      Vec3d v(0.0);
-      for (int c = 0; c < 3; ++c) {
-        v[c] = static_cast<double>((*it)[c]);
-        if (staggered) {
-          Coord next = at;
-          next[c] += 1;
-          typename std::decay_t<decltype(typed)>::ValueType above;
-          if (read.probeValue(next, above)) v[c] = 0.5 * (v[c] + static_cast<double>(above[c]));
-        }
-      }
-      v = linear * v;
-      if (!std::isfinite(v.x) || !std::isfinite(v.y) || !std::isfinite(v.z))
-        throw InputError(path, fmt::format("grid '{}' holds a velocity that is not finite at voxel "
-                                           "({}, {}, {}); clean the cache",
-                                           grid.name(), at.x(), at.y(), at.z()));
-      write.setValueOn(at, openvdb::Vec3f(static_cast<float>(v.x), static_cast<float>(v.y),
-                                          static_cast<float>(v.z)));
+  auto write = out->getAccessor();
+  const bool vectors = visitVectorGrid(*grid.base(), [&](const auto& typed) {
+    for (auto it = typed.cbeginValueOn(); it; ++it) {
+      const openvdb::Vec3f value(*it);
+      openvdb::CoordBBox box;
+      it.getBoundingBox(box);
+      for (int x = box.min().x(); x <= box.max().x(); ++x)
+        for (int y = box.min().y(); y <= box.max().y(); ++y)
+          for (int z = box.min().z(); z <= box.max().z(); ++z)
+            write.setValueOn(Coord(x, y, z), value);
     }
-  };
-  using Types = openvdb::TypeList<openvdb::Vec3SGrid, openvdb::Vec3DGrid, openvdb::Vec3IGrid>;
-  if (!grid.base()->apply<Types>(copy))
+  });
+  if (!vectors)
     throw InputError(path, fmt::format("grid '{}' is of type {}; a velocity is a vector a voxel",
                                        grid.name(), grid.valueType()));
+  return out;
+}
+
+// Centred where they were staggered, and in place.
+Vectors::Ptr placedVectors(const Vectors& from, bool staggered, const Mat3d& linear,
+                           const std::string& name, const std::string& path) {
+  auto out = Vectors::create(openvdb::Vec3f(0));
+  const auto read = from.getConstAccessor();
+  auto write = out->getAccessor();
+  for (auto it = from.cbeginValueOn(); it; ++it) {
+    const Coord at = it.getCoord();
+    Vec3d v(0.0);
+    for (int c = 0; c < 3; ++c) {
+      v[c] = static_cast<double>((*it)(c));
+      Coord next = at;
+      next[static_cast<std::size_t>(c)] += 1;
+      openvdb::Vec3f above;
+      if (staggered && read.probeValue(next, above))
+        v[c] = 0.5 * (v[c] + static_cast<double>(above(c)));
+    }
+    v = linear * v;
+    if (!std::isfinite(v.x) || !std::isfinite(v.y) || !std::isfinite(v.z))
+      throw InputError(path, fmt::format("grid '{}' holds a velocity that is not finite at voxel "
+                                         "({}, {}, {}); clean the cache",
+                                         name, at.x(), at.y(), at.z()));
+    write.setValueOn(at, openvdb::Vec3f(static_cast<float>(v.x), static_cast<float>(v.y),
+                                        static_cast<float>(v.z)));
+  }
   return out;
 }
 
@@ -67,32 +80,30 @@ void forEachNeighbour(const Coord& at, const Visit& visit) {
 // One layer of voxels around what is active, each the mean of its active neighbours.
 // @param front  voxels that may have an inactive neighbour; then, the new layer
 void extend(Vectors& grid, Front& front) {
-  openvdb::MaskTree fresh;
-  auto isOn = grid.getConstAccessor();
-  {
-    openvdb::tree::ValueAccessor<openvdb::MaskTree> mark(fresh);
-    for (const Coord& at : front)
-      forEachNeighbour(at, [&](const Coord& next) {
-        if (!isOn.isValueOn(next)) mark.setValueOn(next);
-      });
-  }
+  const auto read = grid.getConstAccessor();
+  Front fresh;
+  for (const Coord& at : front)
+    forEachNeighbour(at, [&](const Coord& next) {
+      if (!read.isValueOn(next)) fresh.push_back(next);
+    });
+  std::sort(fresh.begin(), fresh.end());
+  fresh.erase(std::unique(fresh.begin(), fresh.end()), fresh.end());
   std::vector<openvdb::Vec3f> values;
-  front.clear();
-  for (auto it = fresh.cbeginValueOn(); it; ++it) {
+  for (const Coord& at : fresh) {
     openvdb::Vec3f sum(0);
     float count = 0;
-    forEachNeighbour(it.getCoord(), [&](const Coord& next) {
+    forEachNeighbour(at, [&](const Coord& next) {
       openvdb::Vec3f v;
-      if (!isOn.probeValue(next, v)) return;
+      if (!read.probeValue(next, v)) return;
       sum += v;
       count += 1;
     });
-    front.push_back(it.getCoord());
     values.push_back(sum / count);
   }
   auto write = grid.getAccessor();
-  for (std::size_t i = 0; i < front.size(); ++i)
-    write.setValueOn(front[i], values[i]);
+  for (std::size_t i = 0; i < fresh.size(); ++i)
+    write.setValueOn(fresh[i], values[i]);
+  front = std::move(fresh);
 }
 
 }  // namespace
@@ -100,7 +111,9 @@ void extend(Vectors& grid, Front& front) {
 Grid velocityForLookups(const Grid& grid, const Mat3d& linear, int margin,
                         const std::string& path) {
   initializeOpenVdb();
-  const Vectors::Ptr vectors = copyVectors(grid, linear, path);
+  const bool staggered = grid.base()->getGridClass() == openvdb::GRID_STAGGERED;
+  const Vectors::Ptr vectors =
+      placedVectors(*floatVectors(grid, path), staggered, linear, grid.name(), path);
   Front front;
   if (margin > 0)
     for (auto it = vectors->cbeginValueOn(); it; ++it)
