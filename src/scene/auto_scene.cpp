@@ -184,12 +184,27 @@ bool isSet(const std::vector<std::string>& sets, std::string_view key) {
   });
 }
 
-std::string cameraText(const Box3d& box, const Vec3d& up, const Vec2i& resolution,
-                       Mat4d& placement) {
-  placement = frameBox(box, box.center(), up, kFov, resolution);
-  return fmt::format(
-      "[camera]\ntype = \"perspective\"\nposition = {}\nlook_at = {}\nup = {}\nfov = {}\n\n",
-      vectorText(Vec3d(placement[3])), vectorText(box.center()), vectorText(up), kFov);
+bool isAnySet(const std::vector<std::string>& sets, std::initializer_list<std::string_view> keys) {
+  return std::any_of(keys.begin(), keys.end(),
+                     [&](std::string_view key) { return isSet(sets, key); });
+}
+
+// A camera that frames the smoke, less what the overrides say in other words.
+std::string cameraText(const Box3d& box, const Vec3d& up, const Mat4d& placement,
+                       const std::vector<std::string>& sets, std::vector<std::string>& choices) {
+  std::string text = "[camera]\n";
+  if (!isAnySet(sets, {"camera.type", "camera.file", "camera.focal_length",
+                       "camera.horizontal_aperture"}))
+    text += fmt::format("fov = {}\n", kFov);
+  if (isAnySet(sets, {"camera.file", "camera.matrix"})) return text + "\n";
+  text += fmt::format("up = {}\n", vectorText(up));
+  // Another kind of camera knows best where it sees all.
+  if (!isSet(sets, "camera.type"))
+    text += fmt::format("position = {}\nlook_at = {}\n", vectorText(Vec3d(placement[3])),
+                        vectorText(box.center()));
+  choices.push_back(
+      "The camera frames the smoke from the front, a little from the right and above.");
+  return text + "\n";
 }
 
 }  // namespace
@@ -220,13 +235,12 @@ SceneFile sceneForVolume(const std::filesystem::path& path, const std::vector<st
                            ? probe.volumes.front().values.vec3("density_scale").x
                            : chooseScale(*smoke.medium, choices);
   const Vec3d up = chooseUp(cache, smoke.worldBounds, choices);
-  Mat4d camera(1.0);
-  std::string text =
-      cameraText(smoke.worldBounds, up, Vec2i(probe.camera.vec2("resolution")), camera);
-  choices.push_back(
-      "The camera frames the smoke from the front, a little from the right and above.");
+  const Mat4d camera = frameBox(smoke.worldBounds, smoke.worldBounds.center(), up, kFov,
+                                Vec2i(probe.camera.vec2("resolution")));
+  std::string text = cameraText(smoke.worldBounds, up, camera, sets, choices);
   text += volumeText(pattern, density, scale);
-  text += keyLight(smoke.worldBounds, up, camera, smoke.space.metersPerUnit, choices);
+  if (!isSet(sets, "light"))
+    text += keyLight(smoke.worldBounds, up, camera, smoke.space.metersPerUnit, choices);
   choices.push_back(fmt::format("albedo = {}, g = {}: bright smoke that scatters forward.", kAlbedo,
                                 kAnisotropy));
   SceneFile scene = parseScene(text, pattern, folder, sets);

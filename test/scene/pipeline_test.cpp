@@ -453,6 +453,36 @@ TEST_F(PipelineTest, ABareVolumeGetsCameraAndLight) {
       7.0);
 }
 
+// What is made up gives way to what says the same in other words.
+TEST_F(PipelineTest, ABareVolumeTakesAnotherCameraOrLight) {
+  const std::string path = ball("bare.vdb", Vec3d(10, 20, 30), 2.0);
+  const auto coverage = [&](const std::vector<std::string>& sets) {
+    std::vector<std::string> all{"camera.resolution=[48, 27]", "estimator.photons=2000"};
+    all.insert(all.end(), sets.begin(), sets.end());
+    const FrameResult r = renderScene(sceneForVolume(path, all), 1);
+    double sum = 0;
+    for (const float a : r.layers.alpha)
+      sum += static_cast<double>(a);
+    return sum / static_cast<double>(r.layers.alpha.size());
+  };
+  const double usual = coverage({});
+  EXPECT_NEAR(coverage({"camera.type=perspective"}), usual, 0.02);
+  EXPECT_NEAR(coverage({"camera.type=orthographic"}), usual, 0.1);
+  EXPECT_GT(coverage({"camera.type=equirectangular"}), 1e-3);
+  EXPECT_LT(coverage({"camera.focal_length=20"}), 0.7 * usual);
+  // From 12 before the middle of a ball of radius 2, 30 degrees high.
+  writeText(m_folder / "shot.chan", "1 10 20 42 0 0 0 30\n");
+  const double tanHalf = std::tan(15 * 3.14159265 / 180);
+  const double radius = 2 / std::sqrt(12.0 * 12 - 4) / tanHalf;  // half heights
+  EXPECT_NEAR(coverage({"camera.file=shot.chan"}), 3.14159265 * radius * radius / 4 * 27 / 48,
+              0.05);
+  const SceneFile lit =
+      sceneForVolume(path, {"light=[{ type = \"point\", position = [0, 0, 0], intensity = 1 }]"});
+  ASSERT_EQ(lit.lights.size(), 1u);
+  for (const std::string& choice : lit.choices)
+    EXPECT_FALSE(contains(choice, "Key light")) << choice;
+}
+
 TEST_F(PipelineTest, ABareVolumeInCentimetresIsLitAlike) {
   const FrameResult metres = renderScene(
       sceneForVolume(ball("m1.vdb"), {"camera.resolution=[32, 32]", "estimator.photons=20000"}), 1);
