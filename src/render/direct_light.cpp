@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "instances.h"
+
 namespace photosphere::render {
 
 namespace {
@@ -63,10 +65,7 @@ Rgb DirectLight::at(const Vec3f& p, const Vec3f& wo, const Coefficients& c, cons
   template Rgb DirectLight::at<LIGHT, WHEN>(const Vec3f&, const Vec3f&, const Coefficients&,   \
                                             const MarchStep*, Rng&, IntegratorCounters&, WHEN) \
       const;
-PHOTOSPHERE_DIRECT(float, transport::Still)
-PHOTOSPHERE_DIRECT(float, transport::Moment)
-PHOTOSPHERE_DIRECT(Rgb, transport::Still)
-PHOTOSPHERE_DIRECT(Rgb, transport::Moment)
+PHOTOSPHERE_FOR_EACH_RAY(PHOTOSPHERE_DIRECT)
 #undef PHOTOSPHERE_DIRECT
 
 }  // namespace photosphere::render

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "instances.h"
+
 namespace photosphere::render {
 
 using transport::Coefficients;
@@ -96,10 +98,7 @@ Rgb FinalGather::arriving(Vec3f p, const Vec3f& d, const Rgb& power, Rng& rng,
 #define PHOTOSPHERE_GATHER(LIGHT, WHEN)                                                         \
   template Rgb FinalGather::multiple<LIGHT, WHEN>(const transport::Segment&, const RayOpacity&, \
                                                   Rng&, IntegratorCounters&, WHEN) const;
-PHOTOSPHERE_GATHER(float, transport::Still)
-PHOTOSPHERE_GATHER(float, transport::Moment)
-PHOTOSPHERE_GATHER(Rgb, transport::Still)
-PHOTOSPHERE_GATHER(Rgb, transport::Moment)
+PHOTOSPHERE_FOR_EACH_RAY(PHOTOSPHERE_GATHER)
 #undef PHOTOSPHERE_GATHER
 
 }  // namespace photosphere::render

@@ -24,8 +24,7 @@ constexpr std::size_t kBrickSize = volume::BrickField<float>::kBrickSize;
 template <class Visit>
 void forEachCorner(const Box3d& box, const Visit& visit) {
   for (int corner = 0; corner < 8; ++corner)
-    visit(Vec3d(corner & 1 ? box.max.x : box.min.x, corner & 2 ? box.max.y : box.min.y,
-                corner & 4 ? box.max.z : box.min.z));
+    visit(box.corner(corner));
 }
 
 }  // namespace
@@ -179,7 +178,8 @@ void LightDepth::fill(const Medium& medium, float step, int channel,
         [&, time](const Vec3f& o, const Vec3f& d) {
           return [&medium, time, channel, o, d](float t) {
             const Vec3f p = o + d * t;
-            return medium.channels(p, medium.extinction(p, time), time)[channel];
+            // Where the channels share no colour, this reads each volume; their sum is not asked.
+            return medium.channels(p, 0.0f, time)[channel];
           };
         },
         step);

@@ -3,6 +3,7 @@
 #include <type_traits>
 
 #include "final_gather.h"
+#include "instances.h"
 
 namespace photosphere::render {
 
@@ -163,8 +164,7 @@ class MarchIntegrator final : public Integrator {
       // The same place, but for rounding.
       if (!(c.extinction > 0.0f)) return transmittance;
     }
-    const Light own = transport::extinctionFor(static_cast<const Light*>(nullptr), m_medium, p,
-                                               c.extinction, when);
+    const Light own = transport::extinctionAs<Light>(m_medium, p, c.extinction, when);
     const Light depth = own * dx;
     const Light attenuated = exponential(-depth);
     const Light average = averaged(depth, attenuated);
@@ -205,13 +205,9 @@ std::unique_ptr<Integrator> makeMarchIntegrator(const Medium& medium,
                                                 const Shadows& shadows,
                                                 const estimators::InscatterSource* source,
                                                 const MarchOptions& options) {
-  const auto make = [&]<class Light, class When>(Light, When) -> std::unique_ptr<Integrator> {
+  return makeFor(medium, [&]<class Light, class When>(Light, When) -> std::unique_ptr<Integrator> {
     return std::make_unique<MarchIntegrator<Light, When>>(medium, lights, shadows, source, options);
-  };
-  if (medium.isMoving())
-    return medium.isColoured() ? make(Rgb(), transport::Moment())
-                               : make(float(), transport::Moment());
-  return medium.isColoured() ? make(Rgb(), transport::Still()) : make(float(), transport::Still());
+  });
 }
 
 }  // namespace photosphere::render

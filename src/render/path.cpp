@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <type_traits>
 
+#include "instances.h"
 #include "photosphere/render/integrator.h"
 #include "photosphere/transport/scatter.h"
 
@@ -203,13 +204,9 @@ class PathIntegrator final : public Integrator {
 std::unique_ptr<Integrator> makePathIntegrator(const Medium& medium,
                                                const transport::LightList& lights,
                                                const PathOptions& options) {
-  const auto make = [&]<class Light, class When>(Light, When) -> std::unique_ptr<Integrator> {
+  return makeFor(medium, [&]<class Light, class When>(Light, When) -> std::unique_ptr<Integrator> {
     return std::make_unique<PathIntegrator<Light, When>>(medium, lights, options);
-  };
-  if (medium.isMoving())
-    return medium.isColoured() ? make(Rgb(), transport::Moment())
-                               : make(float(), transport::Moment());
-  return medium.isColoured() ? make(Rgb(), transport::Still()) : make(float(), transport::Still());
+  });
 }
 
 }  // namespace photosphere::render

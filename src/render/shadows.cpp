@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "instances.h"
 #include "light_depth.h"
 #include "photosphere/core/log.h"
 #include "photosphere/core/resources.h"
@@ -127,8 +128,8 @@ Shadows::Table Shadows::uprightTable(const lights::Light& light,
           static_cast<float>(1.0 / pitch)};
 }
 
-template <class Grids, class Light, class When>
-Light Shadows::depthIn(const Grids& grids, const Vec3f& p, const Light*, When when) const {
+template <class Light, class Grids, class When>
+Light Shadows::depthIn(const Grids& grids, const Vec3f& p, When when) const {
   // Of one time: one number, that times the colour that all volumes share, or three.
   const auto at = [&](std::size_t time) -> Light {
     const auto* grid = grids.data() + time * m_channels;
@@ -156,11 +157,10 @@ template <class Light, class When>
 Light Shadows::transmittance(std::size_t light, const Vec3f& p, const Vec3f& direction,
                              float distance, Rng& rng, transport::TrackingCounters& counters,
                              When when) const {
-  constexpr const Light* kind = nullptr;
   // The optical depth is interpolated, not the transmittance: it is linear where smoke is even.
   const Tabulated& grids = m_tabulated[light];
-  if (!grids.depths.empty()) return attenuated(depthIn(grids.depths, p, kind, when));
-  if (!grids.tables.empty()) return attenuated(depthIn(grids.tables, p, kind, when));
+  if (!grids.depths.empty()) return attenuated(depthIn<Light>(grids.depths, p, when));
+  if (!grids.tables.empty()) return attenuated(depthIn<Light>(grids.tables, p, when));
   const Segment toLight =
       transport::clipToMedium(*m_medium, Vec3d(p), -direction, static_cast<double>(distance));
   if (!(toLight.length > 0.0f)) return Light(1.0f);
@@ -175,10 +175,7 @@ Light Shadows::transmittance(std::size_t light, const Vec3f& p, const Vec3f& dir
   template LIGHT Shadows::transmittance<LIGHT, WHEN>(                                           \
       std::size_t, const Vec3f&, const Vec3f&, float, Rng&, transport::TrackingCounters&, WHEN) \
       const;
-PHOTOSPHERE_SHADOWS(float, transport::Still)
-PHOTOSPHERE_SHADOWS(float, transport::Moment)
-PHOTOSPHERE_SHADOWS(Rgb, transport::Still)
-PHOTOSPHERE_SHADOWS(Rgb, transport::Moment)
+PHOTOSPHERE_FOR_EACH_RAY(PHOTOSPHERE_SHADOWS)
 #undef PHOTOSPHERE_SHADOWS
 
 std::uint64_t Shadows::memoryBytes() const {

@@ -18,7 +18,7 @@ namespace {
 constexpr int kCells = 28;
 constexpr std::size_t kPaths = 1 << 15, kPathsPerChunk = 1 << 11;
 constexpr int kMostScatterings = 256;
-constexpr int kTries = 256;  // photons of each lamp, for the share that hits
+constexpr std::uint64_t kTries = 256;  // photons of each lamp, for the share that hits
 constexpr std::size_t kMostLamps = 64;
 
 // Leaves a flight's length in the cells that it crosses, in pieces of half a cell.
@@ -97,15 +97,8 @@ double hittingShare(const Medium& medium, const transport::LightList& lights) {
   const lights::BoundingSphere bounds = transport::boundingSphere(medium);
   double hits = 0, all = 0;
   for (std::size_t i = 0; i < std::min(lights.size(), kMostLamps); ++i)
-    for (int n = 0; n < kTries; ++n) {
-      // The R4 sequence (Roberts 2018).
-      const auto part = [n](double alpha) {
-        const double u = 0.5 + alpha * n;
-        return static_cast<float>(std::min(u - std::floor(u), 1.0 - 0x1p-24));
-      };
-      const lights::Emission birth =
-          lights[i]->emit(bounds, Vec4f(part(0.8566748838545029), part(0.733891856627126),
-                                        part(0.6287067210378087), part(0.5385972572236101)));
+    for (std::uint64_t n = 0; n < kTries; ++n) {
+      const lights::Emission birth = lights[i]->emit(bounds, transport::evenPoint(n));
       const double power = maxComponent(Vec3d(birth.power));
       if (!(power > 0)) continue;
       all += power;

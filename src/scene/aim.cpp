@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "blur.h"
 #include "photosphere/render/view_importance.h"
 
 namespace photosphere::scene {
@@ -27,18 +28,14 @@ void aimLight(const SceneFile& scene, const render::Crop& crop, FrameSetup& setu
   // A lens and a shutter look around the frame's edges.
   const bool fixed = setup.lens.radius == 0 && !medium.isMoving() && !setup.motion;
   if (!traces || !fixed || medium.bounds().empty()) return;
-  const double width = scene.render.real("filter_width");
-  const double border = 2 + 0.5 * (width > 0 ? width : 3);
   // What is kept changes no pixel, so it goes by the crop. What is steered does: by the whole
   // frame.
-  if (readAlongRays(scene, setup))
-    setup.view.planes = render::viewPlanes(*setup.camera, crop, border, setup.space);
+  if (readAlongRays(scene, setup)) setup.view.planes = seenPlanes(scene, setup, crop);
 
   const std::string& wish = scene.estimator.text("importance");
   if (wish == "off") return;
   const render::Crop frame{Vec2i(0), setup.camera->resolution()};
-  const double visible =
-      render::visibleShare(medium, render::viewPlanes(*setup.camera, frame, border, setup.space));
+  const double visible = render::visibleShare(medium, seenPlanes(scene, setup, frame));
   const double hitting = render::hittingShare(medium, setup.lights);
   if (wish == "auto" && visible >= kVisible && hitting >= kHitting) return;
   auto guide = std::make_shared<transport::PhotonGuide>(

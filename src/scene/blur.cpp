@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "camera_setup.h"
+#include "photosphere/render/view_importance.h"
 
 namespace photosphere::scene {
 
@@ -31,6 +32,14 @@ DirectionCone seenDirections(const SceneFile& scene, const FrameSetup& setup) {
   }
   cone.angle += std::atan2(setup.lens.radius, setup.lens.focusDistance) + rounding;
   return cone;
+}
+
+std::vector<glm::dvec4> seenPlanes(const SceneFile& scene, const FrameSetup& setup,
+                                   const render::Crop& crop) {
+  const double width = scene.render.real("filter_width");
+  // Half of the widest filter that is chosen by its kind, and rounding to whole pixels.
+  const double border = 2 + 0.5 * (width > 0 ? width : 3);
+  return render::viewPlanes(*setup.camera, crop, border, setup.space);
 }
 
 double pixelsPerUnit(const SceneFile& scene, const FrameSetup& setup) {
@@ -62,9 +71,7 @@ double widestBlur(const SceneFile& scene, const FrameSetup& setup) {
   if (box.empty()) return 0;
   double nearest = 1e300, farthest = 0;
   for (int corner = 0; corner < 8; ++corner) {
-    const double d =
-        along(setup, {corner & 1 ? box.max.x : box.min.x, corner & 2 ? box.max.y : box.min.y,
-                      corner & 4 ? box.max.z : box.min.z});
+    const double d = along(setup, box.corner(corner));
     nearest = std::min(nearest, d);
     farthest = std::max(farthest, d);
   }

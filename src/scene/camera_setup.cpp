@@ -16,10 +16,9 @@ double widthOfBox(const Box3d& box, const Vec3d& target, const Mat4d& placement,
                   const Vec2i& resolution) {
   double half = 0;
   for (int corner = 0; corner < 8; ++corner) {
-    const Vec3d p(corner & 1 ? box.max.x : box.min.x, corner & 2 ? box.max.y : box.min.y,
-                  corner & 4 ? box.max.z : box.min.z);
-    const double x = std::abs(glm::dot(p - target, Vec3d(placement[0])));
-    const double y = std::abs(glm::dot(p - target, Vec3d(placement[1])));
+    const Vec3d d = box.corner(corner) - target;
+    const double x = std::abs(glm::dot(d, Vec3d(placement[0])));
+    const double y = std::abs(glm::dot(d, Vec3d(placement[1])));
     half = std::max(half, std::max(x, y * resolution.x / resolution.y));
   }
   return 2 * half;
@@ -104,9 +103,7 @@ Mat4d frameBox(const Box3d& box, const Vec3d& target, const Vec3d& up, double fo
   const double tanY = tanX * resolution.y / resolution.x;
   double distance = 0;
   for (int corner = 0; corner < 8; ++corner) {
-    const Vec3d p(corner & 1 ? box.max.x : box.min.x, corner & 2 ? box.max.y : box.min.y,
-                  corner & 4 ? box.max.z : box.min.z);
-    const Vec3d d = p - target;
+    const Vec3d d = box.corner(corner) - target;
     const double x = std::abs(glm::dot(d, Vec3d(axes[0])));
     const double y = std::abs(glm::dot(d, Vec3d(axes[1])));
     distance = std::max(distance, std::max(x / tanX, y / tanY) + glm::dot(d, toEye));

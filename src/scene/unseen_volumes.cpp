@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "photosphere/render/view_importance.h"
+#include "blur.h"
 
 namespace photosphere::scene {
 
@@ -18,19 +18,9 @@ double product(double a, double b) {
   return a > 0 && b > 0 ? a * b : 0.0;  // nothing times infinity is nothing
 }
 
-Vec3d cornerOf(const Box3d& box, int corner) {
-  return {corner & 1 ? box.max.x : box.min.x, corner & 2 ? box.max.y : box.min.y,
-          corner & 4 ? box.max.z : box.min.z};
-}
-
 Box3d aroundRounding(const Box3d& box) {
   if (box.empty()) return box;
   return volume::widened(box, kSlack * (glm::length(box.extent()) + glm::length(box.center())));
-}
-
-// Farthest that it moves while the shutter is open [m].
-double displacement(const transport::Medium& medium, const transport::MediumVolume& v) {
-  return v.motion.velocity.empty() ? 0.0 : v.motion.fastest * medium.shutter().longest();
 }
 
 // Of all that a volume has, wherever it moves.
@@ -42,7 +32,7 @@ Box3d boxOf(const transport::Medium& medium, const transport::MediumVolume& v) {
     box.grow(glow.min);
     box.grow(glow.max);
   }
-  return aroundRounding(volume::widened(box, displacement(medium, v)));
+  return aroundRounding(volume::widened(box, v.motion.reach(medium.shutter())));
 }
 
 lights::BoundingSphere sphereOf(const Box3d& box) {
@@ -158,10 +148,8 @@ double spread(double opacity, double angle, double integrated, double distance) 
 
 bool isUnseen(const SceneFile& scene, const FrameSetup& setup, const Box3d& box) {
   if (box.empty() || setup.motion) return false;
-  const double width = scene.render.real("filter_width");
-  const render::Crop frame{Vec2i(0), setup.camera->resolution()};
   const std::vector<glm::dvec4> planes =
-      render::viewPlanes(*setup.camera, frame, 2 + 0.5 * (width > 0 ? width : 3), setup.space);
+      seenPlanes(scene, setup, {Vec2i(0), setup.camera->resolution()});
   // At a distance z a ray through the lens is off the one through its middle by its radius times
   // |1 - z / focus|.
   double margin = 0;
@@ -171,13 +159,13 @@ bool isUnseen(const SceneFile& scene, const FrameSetup& setup, const Box3d& box)
     double farthest = 0;
     for (int corner = 0; corner < 8; ++corner)
       farthest =
-          std::max(farthest, glm::dot(cornerOf(box, corner) - eye, setup.camera->viewDirection()));
+          std::max(farthest, glm::dot(box.corner(corner) - eye, setup.camera->viewDirection()));
     margin = setup.lens.radius * setup.space.metersPerUnit *
              std::max(1.0, std::abs(1 - farthest / focus));
   }
   return std::any_of(planes.begin(), planes.end(), [&](const glm::dvec4& plane) {
     for (int corner = 0; corner < 8; ++corner)
-      if (!(glm::dot(plane, glm::dvec4(cornerOf(box, corner), 1.0)) < -margin)) return false;
+      if (!(glm::dot(plane, glm::dvec4(box.corner(corner), 1.0)) < -margin)) return false;
     return true;
   });
 }
@@ -220,7 +208,7 @@ UnseenVolumes::Part UnseenVolumes::makePart(const transport::Medium& medium,
                                             const transport::LightList& lights) {
   Part part;
   part.box = boxOf(medium, v);
-  const double reach = displacement(medium, v);
+  const double reach = v.motion.reach(medium.shutter());
   part.smoke.sphere = sphereOf(v, part.box, reach);
   part.smoke.phases = {v.phase};
   part.smoke.albedo =

@@ -45,7 +45,24 @@ double gainAlong(const Medium& medium, const ImportanceMap& map, const Vec3f& o,
   return sum;
 }
 
+// A number in [0, 1) at a place within one of the cells that divide it, below 1 as a float too.
+double within(std::size_t cell, double place) {
+  return std::min((static_cast<double>(cell) + place) / PhotonGuide::kCells, 1.0 - 0x1p-24);
+}
+
 }  // namespace
+
+Vec4f evenPoint(std::uint64_t n) {
+  // Powers of the inverse of the root of x^5 = x + 1.
+  constexpr double alphas[] = {0.8566748838545029, 0.733891856627126, 0.6287067210378087,
+                               0.5385972572236101};
+  Vec4f point;
+  for (int i = 0; i < 4; ++i) {
+    const double u = 0.5 + alphas[i] * static_cast<double>(n);
+    point[i] = static_cast<float>(std::min(u - std::floor(u), 1.0 - 0x1p-24));
+  }
+  return point;
+}
 
 ImportanceMap::ImportanceMap(const Box3d& bounds, int cells) {
   const Vec3d extent = bounds.extent();
@@ -97,17 +114,11 @@ PhotonGuide::PhotonGuide(const Medium& medium, const LightList& lights, Importan
       parallelFor(gains.size(), 64, [&](std::size_t begin, std::size_t end) {
         for (std::size_t cell = begin; cell < end; ++cell)
           for (int i = 0; i < kTries; ++i) {
-            // Places of the R4 sequence (Roberts 2018), the first two within the cell.
-            const auto n = static_cast<double>(cell * kTries + static_cast<std::size_t>(i));
-            const auto part = [n](double alpha) {
-              return 0.5 + alpha * n - std::floor(0.5 + alpha * n);
-            };
-            const Vec2d in(part(0.8566748838545029), part(0.733891856627126));
-            const Vec2d place = (Vec2d(cell / kCells, cell % kCells) + in) / double(kCells);
-            gains[cell] +=
-                gain(medium, lights, bounds, source,
-                     Vec4f(place.x, place.y, part(0.6287067210378087), part(0.5385972572236101))) /
-                kTries;
+            // The first two numbers are places within the cell.
+            Vec4f u = evenPoint(cell * kTries + static_cast<std::size_t>(i));
+            u.x = static_cast<float>(within(cell / kCells, static_cast<double>(u.x)));
+            u.y = static_cast<float>(within(cell % kCells, static_cast<double>(u.y)));
+            gains[cell] += gain(medium, lights, bounds, source, u) / kTries;
           }
       });
     double sum = 0;
@@ -169,15 +180,15 @@ PhotonGuide::Table PhotonGuide::tableOf(const std::vector<double>& gains, double
   return table;
 }
 
-PhotonGuide::Drawn PhotonGuide::draw(std::size_t source, const Vec2f& u) const {
+PhotonGuide::Drawn PhotonGuide::draw(std::size_t source, const Vec2d& u) const {
   const Table& table = m_tables[source];
-  const auto invert = [](const float* cumulative, float value, int& cell) {
+  const auto invert = [](const float* cumulative, double value, int& cell) {
     const float* found = std::upper_bound(cumulative + 1, cumulative + kCells, value);
     cell = static_cast<int>(found - cumulative) - 1;
-    const float low = cumulative[cell], high = cumulative[cell + 1];
-    const float part = high > low ? (value - low) / (high - low) : 0.5f;
-    return glm::min((static_cast<float>(cell) + glm::clamp(part, 0.0f, 1.0f)) / float(kCells),
-                    1.0f - 0x1p-24f);
+    const auto low = static_cast<double>(cumulative[cell]);
+    const auto high = static_cast<double>(cumulative[cell + 1]);
+    const double part = high > low ? (value - low) / (high - low) : 0.5;
+    return within(static_cast<std::size_t>(cell), glm::clamp(part, 0.0, 1.0));
   };
   Drawn drawn;
   int row = 0, column = 0;

@@ -57,7 +57,7 @@ Medium::Medium(std::vector<MediumVolume> volumes, const Shutter& shutter)
   Hasher hasher;
   std::vector<const VolumeEmission*> emitting;
   for (const MediumVolume& v : m_volumes) {
-    const double reach = v.motion.velocity.empty() ? 0.0 : v.motion.fastest * shutter.longest();
+    const double reach = v.motion.reach(shutter);
     m_displacement = std::max(m_displacement, reach);
     m_motions.push_back(
         {reach > 0 ? &v.motion.velocity : nullptr, volume::NodeFromLocal(v.motion.localFromNode)});

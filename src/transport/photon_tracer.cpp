@@ -160,8 +160,8 @@ class Births {
     float weight = 1.0f;
     if (m_guide) {
       const PhotonGuide::Drawn drawn =
-          m_guide->draw(source, {static_cast<float>(place.first), place.second});
-      place = {static_cast<double>(drawn.u.x), drawn.u.y};
+          m_guide->draw(source, {place.first, static_cast<double>(place.second)});
+      place = {drawn.u.x, static_cast<float>(drawn.u.y)};
       weight = drawn.weight;
     }
     if (source == m_lights.size())

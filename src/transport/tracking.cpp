@@ -34,8 +34,7 @@ Light marchOpticalDepth(const Medium& medium, const Vec3f& o, const Vec3f& d, fl
     Light sum(0.0f);
     for (int i = 0; i < n; ++i) {
       const float t = begin + (static_cast<float>(i) + 0.5f) * h;
-      sum +=
-          extinctionFor(static_cast<const Light*>(nullptr), medium, o + d * t, extinction(t), when);
+      sum += extinctionAs<Light>(medium, o + d * t, extinction(t), when);
     }
     depth += Sum(sum * h);
   }

@@ -31,6 +31,13 @@ inline volume::Grid ballOfSmoke(double voxelSize, const std::string& name = "den
   return volume::denseToGrid(name, Vec3i(n), values, worldFromIndex);
 }
 
+/// Frames smoke.0001.vdb to smoke.000`last`.vdb of that ball, which grows.
+inline void writeSmokeFrames(const TemporaryFolder& folder, int last) {
+  for (int i = 1; i <= last; ++i)
+    volume::writeVdb(folder / ("smoke.000" + std::to_string(i) + ".vdb"),
+                     {ballOfSmoke(0.05 * (1 + i))});
+}
+
 inline double massOf(const volume::Grid& grid) {
   const Vec3d h = grid.voxelSize();
   return volume::statistics(grid).mean * static_cast<double>(grid.activeVoxels()) * h.x * h.y * h.z;

@@ -12,9 +12,7 @@ using nlohmann::json;
 class Plan : public ::testing::Test {
  protected:
   void SetUp() override {
-    for (int i = 1; i <= 2; ++i)
-      volume::writeVdb(m_folder / ("smoke.000" + std::to_string(i) + ".vdb"),
-                       {ballOfSmoke(0.05 * (1 + i))});
+    writeSmokeFrames(m_folder, 2);
     writeText(m_folder / "scene.toml", R"([camera]
 position = [0.6, 0.5, 5]
 look_at = [0.6, 0.5, 0.5]

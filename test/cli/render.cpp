@@ -14,9 +14,7 @@ using nlohmann::json;
 class Render : public ::testing::Test {
  protected:
   void SetUp() override {
-    for (int i = 1; i <= 3; ++i)
-      volume::writeVdb(m_folder / ("smoke.000" + std::to_string(i) + ".vdb"),
-                       {ballOfSmoke(0.05 * (1 + i))});
+    writeSmokeFrames(m_folder, 3);
     writeText(m_folder / "scene.toml", R"([scene]
 seed_per_frame = false
 [camera]

@@ -146,4 +146,11 @@ std::unique_ptr<lights::Light> makeLight(
   return plugin.create(values, lights::LocalSpace{});
 }
 
+transport::LightList lampsBesideAndWithin() {
+  transport::LightList lights;
+  lights.push_back(makeLight("point", {{"position", "[3, 1, 2]"}}));
+  lights.push_back(makeLight("point", {{"position", "[0.1, 0.1, 0.1]"}}));
+  return lights;
+}
+
 }  // namespace photosphere::test

@@ -43,4 +43,8 @@ transport::Medium makeMedium(transport::MediumVolume volume);
 std::unique_ptr<lights::Light> makeLight(
     const std::string& type, const std::vector<std::pair<std::string, std::string>>& options);
 
+/// A point lamp beside smoke in the unit cube, whose shadows are tabulated along its rays, and one
+/// within it, whose shadows are tabulated upright.
+transport::LightList lampsBesideAndWithin();
+
 }  // namespace photosphere::test

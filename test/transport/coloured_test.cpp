@@ -102,9 +102,7 @@ TEST(ColouredExtinction, ShadowTablesOfMixedColoursAgreeWithMarching) {
   const Medium medium(std::move(volumes));
   EXPECT_TRUE(medium.isColoured());
   EXPECT_EQ(medium.tint(), nullptr);
-  transport::LightList lights;
-  lights.push_back(makeLight("point", {{"position", "[3, 1, 2]"}}));
-  lights.push_back(makeLight("point", {{"position", "[0.1, 0.1, 0.1]"}}));
+  const transport::LightList lights = lampsBesideAndWithin();
   const auto step = static_cast<float>(medium.voxelEdge());
   const render::Shadows table(medium, lights, render::ShadowMode::grid, step, 0);
   const render::Shadows march(medium, lights, render::ShadowMode::march, step / 2, 0);

@@ -118,9 +118,7 @@ TEST(MovingSmoke, ShadowTablesFollow) {
   const Medium medium =
       moving(sampledVolume(1.0, 32, {.albedo = 0.9, .extinction = 20.0}, plumeDensity),
              [](const Vec3d&) { return Vec3d(0.4, 0.0, 0.1); });
-  transport::LightList lights;
-  lights.push_back(makeLight("point", {{"position", "[3, 1, 2]"}}));
-  lights.push_back(makeLight("point", {{"position", "[0.1, 0.1, 0.1]"}}));
+  const transport::LightList lights = lampsBesideAndWithin();
   const auto step = static_cast<float>(medium.voxelEdge());
   const render::Shadows table(medium, lights, render::ShadowMode::grid, step, 0);
   const render::Shadows march(medium, lights, render::ShadowMode::march, step / 2, 0);

@@ -47,6 +47,10 @@ struct Box {
   bool empty() const { return max.x < min.x || max.y < min.y || max.z < min.z; }
   V extent() const { return empty() ? V(T(0)) : max - min; }
   V center() const { return min + (max - min) / T(2); }
+  /// One of the eight corners of a box in space; bits 0, 1 and 2 choose the upper x, y and z.
+  V corner(int i) const {
+    return {i & 1 ? max.x : min.x, i & 2 ? max.y : min.y, i & 4 ? max.z : min.z};
+  }
   void grow(const V& p) {
     min = glm::min(min, p);
     max = glm::max(max, p);

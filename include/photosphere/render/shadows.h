@@ -65,8 +65,8 @@ class Shadows {
   Table uprightTable(const lights::Light& light, const transport::SupportLattice& lattice,
                      const Layer& layer) const;
   // Optical depth in one set of grids.
-  template <class Grids, class Light, class When>
-  Light depthIn(const Grids& grids, const Vec3f& p, const Light* kind, When when) const;
+  template <class Light, class Grids, class When>
+  Light depthIn(const Grids& grids, const Vec3f& p, When when) const;
 
   const transport::Medium* m_medium;
   ShadowMode m_mode;

@@ -12,6 +12,10 @@ namespace photosphere::transport {
 
 class Medium;
 
+/// Point n of the R4 sequence (Roberts 2018): four numbers in [0, 1), evenly spread, that stay
+/// below 1 as floats.
+Vec4f evenPoint(std::uint64_t n);
+
 /// Coarse lattice of cubes over the smoke: in each, how much the picture gains on the mean from a
 /// photon that leaves a collision there (adjoint fluence; any unit). Local space [m].
 class ImportanceMap {
@@ -53,12 +57,12 @@ class PhotonGuide {
   const std::vector<double>& sources() const { return m_sources; }
 
   struct Drawn {
-    Vec2f u{0.0f};
+    Vec2d u{0.0};
     float weight = 1.0f;  ///< uniform density over that of the drawing
   };
   /// The two numbers that choose a photon's direction or place at its source, drawn where the
   /// picture gains most. Evenly spread numbers stay evenly spread.
-  Drawn draw(std::size_t source, const Vec2f& u) const;
+  Drawn draw(std::size_t source, const Vec2d& u) const;
 
   /// Weight that a photon at `p` should have, where 1 is what all have that are not steered.
   float wantedWeight(const Vec3f& p) const {
@@ -67,9 +71,9 @@ class PhotonGuide {
   }
 
   static constexpr float kLeast = 1.0f / 16.0f, kMost = 64.0f;
+  static constexpr int kCells = 32;  ///< of each of the two numbers
 
  private:
-  static constexpr int kCells = 32;  // of each of the two numbers
   struct Table {
     std::vector<float> rows;     // cumulative over rows, kCells + 1
     std::vector<float> columns;  // of each row, kCells + 1

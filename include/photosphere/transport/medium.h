@@ -41,6 +41,11 @@ struct VolumeMotion {
   volume::BrickField<Vec4f> velocity;  ///< x, y, z [m/s] in local space; empty = the volume rests
   Mat4d localFromNode{1.0};            ///< node position of `velocity` to local space [m]
   double fastest = 0.0;                ///< [m/s]
+
+  /// Farthest that anything moves while the shutter is open [m].
+  double reach(const Shutter& shutter) const {
+    return velocity.empty() ? 0.0 : fastest * shutter.longest();
+  }
 };
 
 /// One volume, placed in local space (lights/light.h, LocalSpace).

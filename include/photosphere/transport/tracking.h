@@ -86,13 +86,14 @@ inline float largestOf(const Rgb& transmittance) {
 }
 
 /// sigma_t as a transmittance takes it: one number, or one for each channel.
-template <class When>
-inline float extinctionFor(const float*, const Medium&, const Vec3f&, float sigma, When) {
-  return sigma;
-}
-template <class When>
-inline Rgb extinctionFor(const Rgb*, const Medium& medium, const Vec3f& p, float sigma, When when) {
-  return medium.channels(p, sigma, when);
+/// @tparam Light  float or Rgb
+/// @param sigma   Medium::extinction at p
+template <class Light, class When>
+inline Light extinctionAs(const Medium& medium, const Vec3f& p, float sigma, When when) {
+  if constexpr (std::is_same_v<Light, float>)
+    return sigma;
+  else
+    return medium.channels(p, sigma, when);
 }
 
 /// The factor of one tentative collision in a ratio-tracked transmittance, with roulette once that
@@ -142,8 +143,7 @@ inline Light trackTransmittance(const Medium& medium, const Vec3f& o, const Vec3
   forEachTentative(
       medium, o, d, length, rng, counters,
       [&](float t, float sigma, float majorant) {
-        const Light own =
-            extinctionFor(static_cast<const Light*>(nullptr), medium, o + d * t, sigma, when);
+        const Light own = extinctionAs<Light>(medium, o + d * t, sigma, when);
         return attenuate(transmittance, own, majorant, rng);
       },
       when);
@@ -163,8 +163,7 @@ inline Collision sampleCollisionAndTransmittance(const Medium& medium, const Vec
       medium, o, d, length, rng, counters,
       [&](float t, float sigma, float majorant) {
         if (!first.happened() && rng.uniform() * majorant < sigma) first = {t, sigma};
-        const Light own =
-            extinctionFor(static_cast<const Light*>(nullptr), medium, o + d * t, sigma, when);
+        const Light own = extinctionAs<Light>(medium, o + d * t, sigma, when);
         // A ray that has ended dark walks on only until it has its collision.
         return attenuate(transmittance, own, majorant, rng) || !first.happened();
       },

@@ -198,9 +198,7 @@ Box3d supportBounds(const BrickField<T>& field, const Mat4d& localFromNode) {
   Box3d box;
   if (nodes.empty()) return box;
   for (int corner = 0; corner < 8; ++corner)
-    box.grow(transformPoint(localFromNode, Vec3d(corner & 1 ? nodes.max.x : nodes.min.x,
-                                                 corner & 2 ? nodes.max.y : nodes.min.y,
-                                                 corner & 4 ? nodes.max.z : nodes.min.z)));
+    box.grow(transformPoint(localFromNode, Vec3d(nodes.corner(corner))));
   return box;
 }
 
