@@ -9,6 +9,7 @@
 #include "photosphere/core/interrupt.h"
 #include "photosphere/core/log.h"
 #include "photosphere/core/output_file.h"
+#include "photosphere/volume/vdb_file.h"
 
 namespace photosphere::cli {
 
@@ -27,6 +28,11 @@ void checkOutputPattern(const std::string& output, std::size_t frames) {
 void checkWritable(const std::string& path) {
   if (path.empty()) return;
   const OutputFile probe(path);  // writes nothing until it is committed
+}
+
+bool vdbIsComplete(const std::string& path) {
+  std::string reason;
+  return std::filesystem::is_regular_file(path) && volume::probeVdb(path, reason);
 }
 
 int runFrames(const std::vector<std::int64_t>& frames, bool keepGoing,

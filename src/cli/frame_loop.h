@@ -16,6 +16,9 @@ void checkOutputPattern(const std::string& output, std::size_t frames);
 /// it nor the target refuses. An empty path is fine. @throws OutputError
 void checkWritable(const std::string& path);
 
+/// True for a .vdb that is there and can be read to its end.
+bool vdbIsComplete(const std::string& path);
+
 /// Calls `body` frame by frame. With `keepGoing` a frame that fails is reported and the others
 /// follow; an interrupt always ends the loop.
 /// @return exit code: ok, or someFramesFailed

@@ -9,6 +9,7 @@
 #include "photosphere/core/error.h"
 #include "photosphere/core/log.h"
 #include "photosphere/core/resources.h"
+#include "photosphere/core/version.h"
 #include "print.h"
 
 namespace photosphere::cli {
@@ -55,13 +56,6 @@ std::vector<std::int64_t> findCacheFrames(const std::string& pattern) {
   return frames;
 }
 
-void refuseUnserved(const SceneOptions& options) {
-  if (!options.resume.empty() && options.resume != "never")
-    throw ConfigError("--resume is not served by this version yet; start again without it");
-  if (!options.shard.empty())
-    throw ConfigError("--shard is not served by this version yet; trace in one process");
-}
-
 }  // namespace
 
 void addSceneOptions(CLI::App& app, SceneOptions& options) {
@@ -70,10 +64,8 @@ void addSceneOptions(CLI::App& app, SceneOptions& options) {
                  "Statistics as JSON: an object a frame with #### in the path, else an array when "
                  "there are several frames")
       ->type_name("FILE.json");
-  app.add_option("--resume", options.resume, "auto, never or require (not served yet)")
-      ->check(CLI::IsMember(std::vector<std::string>{"auto", "never", "require"}).description(""))
-      ->type_name("WHEN");
   addOutputFrameOptions(app, options.frames);
+  addResumeOptions(app, options.resume);
 }
 
 void addPlanOptions(CLI::App& app, SceneOptions& options) {
@@ -96,7 +88,6 @@ void addPlanOptions(CLI::App& app, SceneOptions& options) {
 }
 
 scene::SceneFile openScene(const SceneOptions& options) {
-  refuseUnserved(options);
   std::vector<std::string> sets = options.sets;
   for (const std::string& text : sets)
     parseAssignment("--set", text);
@@ -146,6 +137,16 @@ CacheFrames::CacheFrames(const scene::SceneFile& scene, const SceneOptions& opti
 bool CacheFrames::map(std::int64_t frame, std::int64_t& cacheFrame) const {
   cacheFrame = frame + m_offset;
   return !m_hold || mapFrame(cacheFrame, m_first, m_last, *m_hold, cacheFrame);
+}
+
+ResumableJob resumableJob(const scene::SceneFile& scene, const SceneOptions& options,
+                          const std::string& more, const std::vector<std::int64_t>& frames,
+                          const std::string& output) {
+  const std::string identity =
+      fmt::format("{} {} {} {} {} {}", buildText(), scene.hash(), options.cacheOffset,
+                  options.cacheHold, options.allowStale, more);
+  return {options.resume, identity, frames,
+          [output](std::int64_t frame) { return framePath(output, frame); }};
 }
 
 void printPlan(const scene::SceneFile& scene, std::int64_t frame,

@@ -10,6 +10,7 @@
 #include "photosphere/core/frames.h"
 #include "photosphere/scene/pipeline.h"
 #include "photosphere/scene/scene_file.h"
+#include "resume.h"
 
 namespace photosphere::cli {
 
@@ -23,7 +24,7 @@ struct SceneOptions {
   std::string stats;
   bool allowStale = false;
   bool dumpScene = false;
-  std::string resume, shard;
+  ResumeOptions resume;
   FrameOptions frames;
 };
 
@@ -52,6 +53,11 @@ class CacheFrames {
   std::int64_t m_offset = 0, m_first = 0, m_last = 0;
   std::optional<CacheHold> m_hold;
 };
+
+/// The job that makes these frames. @param more  what decides its outputs beside the scene
+ResumableJob resumableJob(const scene::SceneFile& scene, const SceneOptions& options,
+                          const std::string& more, const std::vector<std::int64_t>& frames,
+                          const std::string& output);
 
 /// What --dry-run prints of the first frame: what would be simulated, and the memory for it.
 /// @throws what scene::setUpFrame throws

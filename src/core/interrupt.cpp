@@ -3,6 +3,7 @@
 #include <signal.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <string>
 
 #include "photosphere/core/error.h"
@@ -13,6 +14,7 @@ namespace photosphere {
 namespace {
 
 volatile sig_atomic_t g_signal = 0;
+std::atomic<int> g_delays{0};
 
 void onSignal(int signal) {
   if (g_signal != 0) {
@@ -44,7 +46,15 @@ int pendingSignal() {
 }
 
 void throwIfInterrupted() {
-  if (g_signal != 0) throw InterruptedError(g_signal);
+  if (g_signal != 0 && g_delays == 0) throw InterruptedError(g_signal);
+}
+
+InterruptDelay::InterruptDelay() {
+  ++g_delays;
+}
+
+InterruptDelay::~InterruptDelay() {
+  --g_delays;
 }
 
 }  // namespace photosphere

@@ -5,8 +5,11 @@
 #include <mutex>
 #include <type_traits>
 
+#include "photosphere/core/error.h"
+#include "photosphere/core/interrupt.h"
 #include "photosphere/core/parallel.h"
 #include "photosphere/core/progress.h"
+#include "photosphere/core/resources.h"
 #include "photosphere/core/sampling.h"
 
 namespace photosphere::render {
@@ -14,8 +17,9 @@ namespace photosphere::render {
 namespace {
 
 constexpr int kBandRows = 16;
-constexpr int kChunk = 16;          // pixels of a row that one task traces
-constexpr int kSamplesAtOnce = 16;  // bounds the samples kept, whatever render.samples is
+constexpr double kBandSeconds = 2.0;  // where a frame may pause
+constexpr int kChunk = 16;            // pixels of a row that one task traces
+constexpr int kSamplesAtOnce = 16;    // bounds the samples kept, whatever render.samples is
 
 bool finite(const Rgb& c) {
   return std::isfinite(c.x) && std::isfinite(c.y) && std::isfinite(c.z);
@@ -82,39 +86,98 @@ class FrameLoop {
     const auto rows = static_cast<std::uint64_t>(m_out.height() + 2 * m_border);
     Progress progress("render", rows * static_cast<std::uint64_t>(m_options.samples));
     const int end = m_options.firstSample + m_options.samples;
-    for (int first = m_options.firstSample; first < end; first += kSamplesAtOnce)
-      pass(first, std::min(end, first + kSamplesAtOnce), progress);
+    m_first = m_options.firstSample;
+    m_row = m_out.crop.min.y;
+    if (m_options.pause) m_bandRows = 1;  // until it is known what they take
+    if (m_options.begun) resume(*m_options.begun, progress);
+    for (; m_first < end; m_first += kSamplesAtOnce, m_row = m_out.crop.min.y)
+      pass(std::min(end, m_first + kSamplesAtOnce), progress);
     finish();
   }
 
  private:
   int sampleRowWidth() const { return m_out.width() + 2 * m_border; }
 
-  // One pass over the frame with samples [firstSample, endSample) of every pixel.
-  void pass(int firstSample, int endSample, Progress& progress) {
-    m_count = endSample - firstSample;
-    for (int s = firstSample; s < endSample; ++s)
-      m_offsets[static_cast<std::size_t>(s - firstSample)] = sampleOffset(s);
+  // The rest of one pass over the frame, with samples [m_first, endSample) of every pixel.
+  void pass(int endSample, Progress& progress) {
+    m_count = endSample - m_first;
+    for (int s = m_first; s < endSample; ++s)
+      m_offsets[static_cast<std::size_t>(s - m_first)] = sampleOffset(s);
     const std::vector<Tap> filter = taps();
-    const int top = m_out.crop.min.y - m_border, bottom = m_out.crop.max.y + m_border;
+    const int bottom = m_out.crop.max.y + m_border;
     std::vector<std::vector<RayRadiance>> rows;  // traced, from row `kept` on
-    int kept = top, traced = top;
-    for (int y0 = m_out.crop.min.y; y0 < m_out.crop.max.y; y0 += kBandRows) {
-      const int y1 = std::min(y0 + kBandRows, m_out.crop.max.y);
-      const int needed = std::min(y1 + m_border, bottom);
+    int kept = m_row - m_border, traced = kept;
+    while (m_row < m_out.crop.max.y) {
+      const Stopwatch watch;
+      const int end = std::min(m_row + m_bandRows, m_out.crop.max.y);
+      const int needed = std::min(end + m_border, bottom);
       rows.resize(static_cast<std::size_t>(needed - kept));
-      traceRows(rows, kept, traced, needed, firstSample);
+      band(rows, kept, traced, needed);
       progress.add(static_cast<std::uint64_t>(needed - traced) *
                    static_cast<std::uint64_t>(m_count));
       traced = needed;
-      parallelFor(static_cast<std::size_t>(y1 - y0), 1, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i)
-          filterRow(rows, kept, y0 + static_cast<int>(i), filter);
-      });
-      const int keep = y1 - m_border;
+      {
+        const InterruptDelay delay;  // pixels are added to all or none
+        parallelFor(static_cast<std::size_t>(end - m_row), 1,
+                    [&](std::size_t begin, std::size_t last) {
+                      for (std::size_t i = begin; i < last; ++i)
+                        filterRow(rows, kept, m_row + static_cast<int>(i), filter);
+                    });
+      }
+      const int keep = end - m_border;
       rows.erase(rows.begin(), rows.begin() + (keep - kept));
       kept = keep;
+      m_row = end;
+      if (!m_options.pause) continue;
+      // Bands are what an interruption loses.
+      const double fit = kBandSeconds / std::max(watch.seconds(), 1e-3);
+      m_bandRows = std::clamp(static_cast<int>(std::min(fit, 2.0) * m_bandRows), 1, kBandRows);
+      pause();
     }
+  }
+
+  // Traces rows of samples. Where that is interrupted the frame is what the bands before made it.
+  void band(std::vector<std::vector<RayRadiance>>& rows, int kept, int begin, int end) {
+    const IntegratorCounters counters = m_out.counters;
+    const std::uint64_t nans = m_out.nanSamples, negatives = m_out.negativeSamples;
+    const Vec2i bad = m_out.firstBad;
+    try {
+      traceRows(rows, kept, begin, end, m_first);
+    } catch (const InterruptedError&) {
+      m_out.counters = counters;
+      m_out.nanSamples = nans;
+      m_out.negativeSamples = negatives;
+      m_out.firstBad = bad;
+      pause();
+      throw;
+    }
+  }
+
+  void pause() const {
+    if (m_options.pause) m_options.pause([this](StateWriter& w) { keep(w); });
+  }
+  void keep(StateWriter& w) const {
+    w.value(m_first);
+    w.value(m_row);
+    w.value(m_out.counters);
+    w.value(m_out.nanSamples);
+    w.value(m_out.negativeSamples);
+    w.value(m_out.firstBad);
+    w.values(m_sums);
+  }
+  void resume(StateReader& r, Progress& progress) {
+    r.value(m_first);
+    r.value(m_row);
+    r.value(m_out.counters);
+    r.value(m_out.nanSamples);
+    r.value(m_out.negativeSamples);
+    r.value(m_out.firstBad);
+    const std::size_t size = m_sums.size();
+    r.values(m_sums);
+    if (m_sums.size() != size || m_row < m_out.crop.min.y || m_row > m_out.crop.max.y) r.fail();
+    const auto passes = static_cast<std::uint64_t>(m_first - m_options.firstSample);
+    progress.add(passes * static_cast<std::uint64_t>(m_out.height()) +
+                 static_cast<std::uint64_t>(m_row - m_out.crop.min.y));
   }
 
   void traceRows(std::vector<std::vector<RayRadiance>>& rows, int kept, int begin, int end,
@@ -275,6 +338,8 @@ class FrameLoop {
   PixelFilter m_filter;
   int m_border;
   cameras::Placement m_still;
+  int m_first = 0, m_row = 0;  // next: samples from m_first on, of pixels from row m_row on
+  int m_bandRows = kBandRows;
   int m_count = 0;
   std::array<Vec2d, kSamplesAtOnce> m_offsets{};
   std::vector<PixelSum> m_sums;

@@ -53,4 +53,32 @@ FrameLayers FrameMean::mean() const {
   return out;
 }
 
+void FrameMean::keep(StateWriter& w) const {
+  w.value(m_count);
+  w.value(m_sum.crop);
+  w.value(m_sum.resolution);
+  for (const auto layer : kColours)
+    w.values(m_sum.*layer);
+  w.values(m_sum.alpha);
+  w.values(m_sum.depth);
+  w.value(m_sum.nanSamples);
+  w.value(m_sum.negativeSamples);
+  w.value(m_sum.firstBad);
+  w.value(m_sum.counters);
+}
+
+void FrameMean::resume(StateReader& r) {
+  r.value(m_count);
+  r.value(m_sum.crop);
+  r.value(m_sum.resolution);
+  for (const auto layer : kColours)
+    r.values(m_sum.*layer);
+  r.values(m_sum.alpha);
+  r.values(m_sum.depth);
+  r.value(m_sum.nanSamples);
+  r.value(m_sum.negativeSamples);
+  r.value(m_sum.firstBad);
+  r.value(m_sum.counters);
+}
+
 }  // namespace photosphere::render

@@ -4,77 +4,34 @@
 
 #include <algorithm>
 
-#include "estimator_options.h"
 #include "layer_renderer.h"
-#include "light_stage.h"
-#include "photon_map_stage.h"
+#include "pass_light.h"
+#include "photosphere/core/error.h"
+#include "photosphere/core/log.h"
 
 namespace photosphere::scene {
 
 namespace {
 
-// A basis that can go negative is clamped where it is read.
-void noteClamped(double share, FrameSetup& setup, FrameStatistics& statistics) {
-  statistics.clampedLight = share;
-  if (!(share > 0.001)) return;
-  setup.notes.push_back(fmt::format(
-      "{:.2g} of the stored light is below zero toward where it is read and counts as 0, a bias of "
-      "the basis beside sharp peaks; raise estimator.{}",
-      share,
-      setup.layout.basis == estimators::Basis::sphericalHarmonics
-          ? "order, or smooth with estimator.kernel"
-          : "rows"));
-}
-
-std::string describe(const estimators::PhotonMapLayout& map) {
-  return fmt::format("photon map, {} channel{}, {}{}", map.channels, map.channels == 1 ? "" : "s",
-                     map.neighbors > 0 ? fmt::format("{} nearest", map.neighbors) : "all in reach",
-                     map.passes > 1 ? fmt::format(", {} passes", map.passes) : "");
-}
-
-using Source = std::unique_ptr<estimators::InscatterSource>;
-
-// The light of one pass of a frame, ready to be looked up; null where nothing asks for it.
-struct PassLight {
-  Source source;
-  Source wider;  // the same photons through a wider kernel, where that is asked for
-};
-
 // Share of the squared target that noise and doubt may have in an estimate that stands.
 constexpr double kSettled = 0.1;
 
-// How much wider.
-constexpr double kWidening = 1.5;
+constexpr const char* kPart = "frame";  // of the checkpoint
 
-Source widened(const FrameSetup& setup, estimators::LightField field) {
-  // A kernel narrower than a light voxel does nothing: the voxel itself is the width there.
-  const double edge = field.layout.lightVoxel * setup.medium->voxelEdge();
-  field.layout.radius = kWidening * std::max(field.layout.radius, edge);
-  return estimators::resolve(*setup.medium, std::move(field), setup.view, setup.key);
-}
-
-PassLight prepareLight(const SceneFile& scene, const RenderRequest& request, int pass, bool wider,
-                       FrameSetup& setup, FrameResult& result) {
-  PassLight light;
-  if (!storesLight(scene, setup)) return light;
-  if (setup.photonMap) {
-    result.layout = describe(*setup.photonMap);
-    result.radius = setup.photonMap->radius / setup.space.metersPerUnit;
-    light.source = photonMapPass(setup, pass, 1.0, result.statistics);
-    FrameStatistics again;
-    if (wider) light.wider = photonMapPass(setup, pass, kWidening, again);
-    return light;
-  }
-  estimators::LightField field = lightField(scene, request, setup, result.statistics);
-  result.layout = describeLayout(setup.layout);
-  result.radius = setup.layout.radius / setup.space.metersPerUnit;
-  const Stopwatch watch;
-  if (wider) light.wider = widened(setup, field);
-  auto source = estimators::resolve(*setup.medium, std::move(field), setup.view, setup.key);
-  result.statistics.seconds.resolve += watch.seconds();
-  noteClamped(source->clampedShare(), setup, result.statistics);
-  light.source = std::move(source);
-  return light;
+// What batches add up.
+template <class Statistics, class Visit>
+void eachNumber(Statistics& s, const Visit& visit) {
+  visit(s.seconds);
+  visit(s.photonsEmitted);
+  visit(s.photonsScattered);
+  visit(s.photonsStored);
+  visit(s.photonsCapped);
+  visit(s.lightMemoryBytes);
+  for (auto* power : {&s.energyEmitted, &s.energyMissed, &s.energyAbsorbed, &s.energyEscaped,
+                      &s.energyCapped, &s.energyError})
+    visit(*power);
+  visit(s.majorantViolations);
+  visit(s.clampedLight);
 }
 
 // The frame in independent batches, each of photons, samples and random numbers of its own, until
@@ -97,14 +54,21 @@ class FrameLoop {
         m_error(crop.max.x - crop.min.x) {}
 
   void run() {
-    do {
-      if (wantsBatch())
-        renderBatch();
-      else
-        renderTruth();
-    } while (!done());
+    resume();
+    try {
+      while (m_batches == 0 || !done())
+        if (wantsBatch())
+          renderBatch();
+        else
+          renderTruth();
+    } catch (const InterruptedError&) {
+      // What this part keeps of its own accord is more than this.
+      if (!m_partKept) keepParts();
+      throw;
+    }
     if (!once()) m_result.layers = m_mean.mean();
     m_result.statistics.batches = m_batches;
+    m_result.statistics.seconds.total += m_secondsBefore;
     if (m_setup.batches > 1) reportError();
   }
 
@@ -120,32 +84,110 @@ class FrameLoop {
   // One batch: all passes of a progressive photon map, one of everything else.
   void renderBatch() {
     m_setup.key = m_batches == 0 ? m_key : RandomKey::fromSeed(seed(), m_batches);
+    for (; m_pass < m_passes; ++m_pass) {
+      if (m_pass > 0) offer();
+      renderPass();
+    }
+    m_pass = 0;
+    ++m_batches;
+    m_setup.key = m_key;
+    offer();
+  }
+
+  void renderPass() {
     const bool judged = m_setup.batches > 1;
     const bool wider = m_target > 0 && m_batches < m_setup.batches;
-    const std::size_t notes = m_setup.notes.size();
-    for (int pass = 0; pass < m_passes; ++pass) {
-      const PassLight light = prepareLight(m_scene, m_request, pass, wider, m_setup, m_result);
-      const Stopwatch watch;
-      if (!m_renderer) m_renderer.emplace(m_scene, m_crop, m_setup);
-      render::FrameLayers layers = m_renderer->render(light.source.get(), pass);
-      if (!once()) m_mean.add(layers);
-      if (light.wider)
-        m_error.add(layers.beauty, m_renderer->render(light.wider.get(), pass).beauty, kWidening);
-      else if (judged)
-        m_error.add(layers.beauty);
-      if (once()) m_result.layers = std::move(layers);
-      m_result.statistics.seconds.march += watch.seconds();
-    }
+    m_statisticsBefore = m_result.statistics;
+    m_notesBefore = m_setup.notes.size();
+    const PassLight light =
+        prepareLight(m_scene, m_request, m_batches, m_pass, wider, m_setup, m_result);
     // What a batch has to say it says once.
-    if (m_batches++ > 0) m_setup.notes.resize(notes);
-    m_setup.key = m_key;
+    if (m_batches > 0 || m_pass > 0) m_setup.notes.resize(m_notesBefore);
+    const Stopwatch watch;
+    if (!m_renderer) m_renderer.emplace(m_scene, m_crop, m_setup);
+    StateReader* begun = m_film ? &*m_film : nullptr;
+    render::FrameLayers layers = m_renderer->render(light.source.get(), m_pass, begun, filmPause());
+    m_film.reset();
+    if (!once()) m_mean.add(layers);
+    if (light.wider)
+      m_error.add(layers.beauty, m_renderer->render(light.wider.get(), m_pass).beauty, kWidening);
+    else if (judged)
+      m_error.add(layers.beauty);
+    if (once()) m_result.layers = std::move(layers);
+    m_result.statistics.seconds.march += watch.seconds();
+    m_partKept = false;
   }
 
   void renderTruth() {
     const Stopwatch watch;
+    if (!m_renderer) m_renderer.emplace(m_scene, m_crop, m_setup);
     // Another seed than the batches': its bits turned over.
     m_error.addTruth(m_renderer->truth(RandomKey::fromSeed(~seed(), m_error.truths())));
     m_result.statistics.seconds.check += watch.seconds();
+    offer();
+  }
+
+  // Between parts. A frame of one part is done when that is, and needs keeping no more.
+  void offer() {
+    m_statisticsBefore = m_result.statistics;
+    m_notesBefore = m_setup.notes.size();
+    if (m_request.checkpoint && !once())
+      m_request.checkpoint->offer(kPart, [&](StateWriter& w) { keep(w); });
+  }
+  void keepParts() const {
+    if (m_request.checkpoint && m_batches + m_pass > 0)
+      m_request.checkpoint->save(kPart, [&](StateWriter& w) { keep(w); });
+  }
+  PausePoint filmPause() {
+    if (!m_request.checkpoint) return {};
+    return [&](const WriteState& film) {
+      m_request.checkpoint->offer(kPart, [&](StateWriter& w) {
+        keep(w);
+        w.value(true);
+        film(w);
+        m_partKept = true;
+      });
+    };
+  }
+
+  // All that the parts that are done have left.
+  void keep(StateWriter& w) const {
+    w.value(m_batches);
+    w.value(m_pass);
+    w.value(m_secondsBefore + m_watch.seconds());
+    eachNumber(m_statisticsBefore, [&](const auto& v) { w.value(v); });
+    w.value(m_estimate);
+    w.text(m_result.layout);
+    w.value(m_result.radius);
+    w.value(static_cast<std::uint64_t>(m_notesBefore));
+    for (std::size_t i = 0; i < m_notesBefore; ++i)
+      w.text(m_setup.notes[i]);
+    m_mean.keep(w);
+    m_error.keep(w);
+  }
+
+  void resume() {
+    if (!m_request.checkpoint) return;
+    std::optional<StateReader> kept = m_request.checkpoint->load(kPart);
+    if (!kept) return;
+    kept->value(m_batches);
+    kept->value(m_pass);
+    kept->value(m_secondsBefore);
+    eachNumber(m_result.statistics, [&](auto& v) { kept->value(v); });
+    kept->value(m_estimate);
+    m_result.layout = kept->text();
+    kept->value(m_result.radius);
+    m_setup.notes.clear();
+    for (auto notes = kept->value<std::uint64_t>(); notes > 0; --notes)
+      m_setup.notes.push_back(kept->text());
+    m_mean.resume(*kept);
+    m_error.resume(*kept);
+    log::info("frame {} goes on from what {:.1f} s have made of it", m_setup.frame,
+              m_secondsBefore);
+    if (kept->atEnd()) return;
+    kept->value<bool>();
+    m_film = std::move(kept);
+    m_partKept = true;
   }
 
   std::uint64_t seed() const { return static_cast<std::uint64_t>(m_key.hi) << 32 | m_key.lo; }
@@ -157,7 +199,7 @@ class FrameLoop {
   }
 
   bool done() {
-    const bool late = m_timeLimit > 0 && m_watch.seconds() > m_timeLimit;
+    const bool late = m_timeLimit > 0 && m_secondsBefore + m_watch.seconds() > m_timeLimit;
     if (tooFew()) return late;
     if (!(m_target > 0)) return true;
     const ErrorEstimate e = m_estimate = m_error.estimate();
@@ -209,8 +251,14 @@ class FrameLoop {
   FrameSetup& m_setup;
   FrameResult& m_result;
   double m_target, m_timeLimit;
-  int m_passes, m_batches = 0;
-  bool m_checked;  ///< against path traced frames
+  int m_passes;
+  int m_batches = 0, m_pass = 0;       // done; of the batch under way
+  double m_secondsBefore = 0;          // of earlier runs
+  FrameStatistics m_statisticsBefore;  // without the pass under way
+  std::size_t m_notesBefore = 0;       // the same
+  std::optional<StateReader> m_film;   // what an earlier run had of the pass under way
+  bool m_partKept = false;             // the checkpoint has some of the pass under way
+  bool m_checked;                      ///< against path traced frames
   RandomKey m_key;
   std::optional<LayerRenderer> m_renderer;
   render::FrameMean m_mean;

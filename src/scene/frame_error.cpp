@@ -307,4 +307,30 @@ std::vector<Rgb> FrameError::standardError() const {
   return out;
 }
 
+void FrameError::keep(StateWriter& w) const {
+  for (const Pyramid* pyramid : {&m_frames[0], &m_frames[1], &m_wider, &m_truths}) {
+    w.value(pyramid->count);
+    w.value(static_cast<std::uint64_t>(pyramid->levels.size()));
+    for (const Moments& level : pyramid->levels) {
+      w.value(level.width);
+      w.values(level.mean);
+      w.values(level.squares);
+    }
+  }
+}
+
+void FrameError::resume(StateReader& r) {
+  for (Pyramid* pyramid : {&m_frames[0], &m_frames[1], &m_wider, &m_truths}) {
+    r.value(pyramid->count);
+    const auto levels = r.value<std::uint64_t>();
+    if (levels > 64) r.fail();
+    pyramid->levels.resize(static_cast<std::size_t>(levels));
+    for (Moments& level : pyramid->levels) {
+      r.value(level.width);
+      r.values(level.mean);
+      r.values(level.squares);
+    }
+  }
+}
+
 }  // namespace photosphere::scene

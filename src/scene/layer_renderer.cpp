@@ -81,9 +81,22 @@ LayerRenderer::LayerRenderer(const SceneFile& scene, const render::Crop& crop,
 }
 
 render::FrameLayers LayerRenderer::render(const estimators::InscatterSource* source, int pass,
-                                          const render::Crop& crop) const {
+                                          StateReader* begun, const PausePoint& pause) const {
+  render::FrameOptions options = m_options;
+  options.begun = begun;
+  options.pause = pause;
+  return render(source, pass, std::move(options));
+}
+
+render::FrameLayers LayerRenderer::renderCrop(const estimators::InscatterSource* source, int pass,
+                                              const render::Crop& crop) const {
   render::FrameOptions options = m_options;
   options.crop = crop;
+  return render(source, pass, std::move(options));
+}
+
+render::FrameLayers LayerRenderer::render(const estimators::InscatterSource* source, int pass,
+                                          render::FrameOptions options) const {
   options.key = m_setup.key;
   options.firstSample = pass * options.samples;
   const auto integrator = m_paths

@@ -16,11 +16,12 @@ class LayerRenderer {
   LayerRenderer(const SceneFile& scene, const render::Crop& crop, const FrameSetup& setup);
 
   /// @param source  the estimator's answer; may be null
-  render::FrameLayers render(const estimators::InscatterSource* source, int pass) const {
-    return render(source, pass, m_options.crop);
-  }
+  /// @param begun   see render::FrameOptions
   render::FrameLayers render(const estimators::InscatterSource* source, int pass,
-                             const render::Crop& crop) const;
+                             StateReader* begun = nullptr, const PausePoint& pause = {}) const;
+  /// A part of the frame.
+  render::FrameLayers renderCrop(const estimators::InscatterSource* source, int pass,
+                                 const render::Crop& crop) const;
   /// `beauty` as path tracing has it, from a few paths a pixel and random numbers of its own.
   std::vector<Rgb> truth(RandomKey key) const;
   /// Rays of one pass over a crop, those of the filter's border too.
@@ -29,6 +30,9 @@ class LayerRenderer {
   std::uint64_t memoryBytes() const { return m_shadows ? m_shadows->memoryBytes() : 0; }
 
  private:
+  render::FrameLayers render(const estimators::InscatterSource* source, int pass,
+                             render::FrameOptions options) const;
+
   const FrameSetup& m_setup;
   bool m_paths;
   render::FrameOptions m_options;

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <tuple>
+
 #include "photosphere/core/error.h"
 #include "photosphere/core/frames.h"
 #include "photosphere/core/hash.h"
@@ -30,10 +32,6 @@ std::string lightHash(const SceneFile& scene, const FrameSetup& setup) {
   return hasher.hex();
 }
 
-estimators::LightCacheKey cacheKey(const SceneFile& scene, const FrameSetup& setup) {
-  return {setup.medium->hash(), lightHash(scene, setup), setup.space};
-}
-
 // Keys that decided what a cache holds act no more once it is read.
 void noteIdleKeys(const SceneFile& scene, FrameSetup& setup) {
   std::vector<std::string_view> idle;
@@ -54,7 +52,7 @@ estimators::LightField readField(const SceneFile& scene, bool allowStale, FrameS
   const Stopwatch watch;
   const std::string path = framePath(scene.resolvePath(scene.estimator.text("cache")), setup.frame);
   estimators::LightField field =
-      estimators::readLightCache(path, cacheKey(scene, setup), allowStale);
+      estimators::readLightCache(path, lightKey(scene, setup), allowStale);
   // How light is read is the scene's to say; kernel and bandwidth were used up where they spread
   // it.
   estimators::LightFieldLayout& layout = field.layout;
@@ -95,35 +93,49 @@ void addTraced(const transport::TraceStatistics& traced, FrameStatistics& s) {
   s.energyError += traced.imbalance();
 }
 
-estimators::LightField lightField(const SceneFile& scene, const RenderRequest& request,
-                                  FrameSetup& setup, FrameStatistics& statistics) {
-  if (!scene.estimator.text("cache").empty())
-    return readField(scene, request.allowStale, setup, statistics);
+estimators::LightCacheKey lightKey(const SceneFile& scene, const FrameSetup& setup) {
+  return {setup.medium->hash(), lightHash(scene, setup), setup.space};
+}
+
+estimators::LightSums lightSums(const RenderRequest& request, FrameSetup& setup,
+                                FrameStatistics& statistics, transport::TraceStatistics& traced,
+                                std::uint64_t part) {
   const Stopwatch watch;
   transport::TraceOptions options;
   options.photons = setup.photons;
   options.key = setup.key;
   options.guide = setup.guide.get();
-  transport::TraceStatistics traced;
-  estimators::LightField field = estimators::traceLightField(
-      *setup.medium, setup.lights, setup.layout, setup.view, setup.particles, options, traced);
+  if (request.shard)
+    std::tie(options.firstPhoton, options.photonCount) =
+        estimators::photonsOf(*request.shard, setup.photons);
+  estimators::LightSums light =
+      estimators::traceLightSums(*setup.medium, setup.lights, setup.layout, setup.view,
+                                 setup.particles, options, traced, request.checkpoint, part);
   addTraced(traced, statistics);
   // Every flight after a scattering or from the smoke's own emission leaves light; the first one of
   // a lamp does where lamps with extent are kept.
   statistics.photonsStored +=
       setup.layout.unscattered ? traced.flights : traced.scatterings + traced.born;
-  statistics.lightMemoryBytes = field.memoryBytes();
-  if (field.farPhotons > 0)
+  if (light.farPhotons > 0)
     setup.notes.push_back(fmt::format(
         "{} photons met no particle within the deposit radius and went to the nearest one",
-        field.farPhotons));
+        light.farPhotons));
   statistics.seconds.trace += watch.seconds();
-  return field;
+  return light;
 }
 
-void storeLightField(const SceneFile& scene, const FrameSetup& setup,
-                     const estimators::LightField& field, const std::string& path) {
-  estimators::writeLightCache(path, field, cacheKey(scene, setup));
+estimators::LightField lightField(const SceneFile& scene, const RenderRequest& request,
+                                  FrameSetup& setup, FrameStatistics& statistics,
+                                  std::uint64_t part) {
+  if (!scene.estimator.text("cache").empty())
+    return readField(scene, request.allowStale, setup, statistics);
+  transport::TraceStatistics traced;
+  estimators::LightSums light = lightSums(request, setup, statistics, traced, part);
+  const Stopwatch watch;
+  estimators::LightField field = estimators::toField(std::move(light));
+  statistics.lightMemoryBytes = field.memoryBytes();
+  statistics.seconds.trace += watch.seconds();
+  return field;
 }
 
 }  // namespace photosphere::scene

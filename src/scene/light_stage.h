@@ -10,12 +10,18 @@ void addTraced(const transport::TraceStatistics& traced, FrameStatistics& statis
 
 /// Fills photon counts, energies, and the seconds of tracing (or of reading a cache). Where a cache
 /// is read, `setup.layout` becomes the cache's.
+/// @param part  tells the parts of a frame apart in its checkpoint
 /// @throws what tracing and reading throw; InputError for a light cache of another medium or lights
 estimators::LightField lightField(const SceneFile& scene, const RenderRequest& request,
-                                  FrameSetup& setup, FrameStatistics& statistics);
+                                  FrameSetup& setup, FrameStatistics& statistics,
+                                  std::uint64_t part = 0);
 
-/// Writes a light field with the hashes of what it was traced in. @throws OutputError
-void storeLightField(const SceneFile& scene, const FrameSetup& setup,
-                     const estimators::LightField& field, const std::string& path);
+/// The sums of the photons that the request asks for: all, or one shard's.
+estimators::LightSums lightSums(const RenderRequest& request, FrameSetup& setup,
+                                FrameStatistics& statistics, transport::TraceStatistics& traced,
+                                std::uint64_t part = 0);
+
+/// What light belongs to.
+estimators::LightCacheKey lightKey(const SceneFile& scene, const FrameSetup& setup);
 
 }  // namespace photosphere::scene

@@ -10,7 +10,10 @@
 #include "light_stage.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/frames.h"
+#include "photosphere/core/hash.h"
+#include "photosphere/core/interrupt.h"
 #include "photosphere/core/resources.h"
+#include "photosphere/core/version.h"
 
 namespace photosphere::scene {
 
@@ -88,6 +91,35 @@ SetupOptions setupOptions(const RenderRequest& request) {
   return options;
 }
 
+// Names the work for its checkpoint: all that its result depends on.
+std::string workOf(std::string_view what, const SceneFile& scene, const FrameSetup& setup,
+                   const RenderRequest& request, const render::Crop& crop) {
+  Hasher hasher;
+  hasher.text(buildText());
+  hasher.text(what);
+  hasher.text(scene.hash());
+  const estimators::LightCacheKey key = lightKey(scene, setup);
+  hasher.text(key.mediumHash);
+  hasher.text(key.lightHash);
+  for (const std::int64_t number :
+       {setup.frame, request.cacheFrame.value_or(setup.frame),
+        static_cast<std::int64_t>(setup.key.lo), static_cast<std::int64_t>(setup.key.hi)})
+    hasher.number(number);
+  const Vec2i size = setup.camera->resolution();
+  for (const int number : {size.x, size.y, crop.min.x, crop.min.y, crop.max.x, crop.max.y})
+    hasher.number(number);
+  const estimators::ShardNumber shard = request.shard.value_or(estimators::ShardNumber{});
+  hasher.number(shard.index);
+  hasher.number(shard.count);
+  if (const std::string& cache = scene.estimator.text("cache"); !cache.empty()) {
+    const std::filesystem::path path = framePath(scene.resolvePath(cache), setup.frame);
+    std::error_code error;
+    hasher.number(static_cast<std::uint64_t>(std::filesystem::file_size(path, error)));
+    hasher.number(std::filesystem::last_write_time(path, error).time_since_epoch().count());
+  }
+  return hasher.hex();
+}
+
 void startStatistics(const SceneFile& scene, const FrameSetup& setup, FrameStatistics& s) {
   s.seconds.read = setup.readSeconds;
   s.seconds.rasterize = setup.rasterizeSeconds;
@@ -114,6 +146,8 @@ FrameResult renderScene(const SceneFile& written, std::int64_t frame,
   result.estimator = scene.estimator.text("type");
   result.seed = request.seed.value_or(scene.scene.integer("seed"));
 
+  if (request.checkpoint)
+    request.checkpoint->identify(workOf("render", scene, setup, request, crop));
   const Stopwatch aiming;
   aimLight(scene, crop, setup);
   if (setup.guide) result.statistics.seconds.trace += aiming.seconds();
@@ -122,7 +156,7 @@ FrameResult renderScene(const SceneFile& written, std::int64_t frame,
   result.notes = setup.notes;
   finish(setup, cpuBefore, result);
   checkSamples(result.layers);
-  result.statistics.seconds.total = total.seconds();
+  result.statistics.seconds.total += total.seconds();
   return result;
 }
 
@@ -148,14 +182,46 @@ FrameStatistics traceScene(const SceneFile& written, std::int64_t frame, const s
   FrameStatistics statistics;
   startStatistics(scene, setup, statistics);
   checkMemory(setup, true);
-  const estimators::LightField field = lightField(scene, request, setup, statistics);
+  if (request.checkpoint) request.checkpoint->identify(workOf("trace", scene, setup, request, {}));
+  transport::TraceStatistics traced;
+  estimators::LightSums light = lightSums(request, setup, statistics, traced);
+  const std::string path = framePath(output, frame);
   const Stopwatch writing;
-  storeLightField(scene, setup, field, framePath(output, frame));
+  const InterruptDelay delay;  // what is traced is written
+  if (request.shard)
+    estimators::writeLightShard(
+        path, {*request.shard, std::move(light), lightKey(scene, setup),
+               fmt::format("{:08x}{:08x}", setup.key.hi, setup.key.lo), buildText(), traced});
+  else
+    estimators::writeLightCache(path, estimators::toField(std::move(light)),
+                                lightKey(scene, setup));
   statistics.seconds.write = writing.seconds();
   statistics.effects = setup.effectStates;
   statistics.cpuSeconds = processCpuSeconds() - cpuBefore;
   statistics.peakMemoryBytes = peakMemoryBytes();
   statistics.seconds.total = total.seconds();
+  return statistics;
+}
+
+FrameStatistics mergeShards(const std::vector<std::filesystem::path>& shards,
+                            const std::string& output, std::vector<std::string>& notes) {
+  const Stopwatch total;
+  const double cpuBefore = processCpuSeconds();
+  FrameStatistics statistics;
+  estimators::MergedLight merged = estimators::mergeLightShards(shards);
+  notes = merged.notes;
+  addTraced(merged.statistics, statistics);
+  statistics.photonsStored = merged.field.layout.unscattered
+                                 ? merged.statistics.flights
+                                 : merged.statistics.scatterings + merged.statistics.born;
+  statistics.lightMemoryBytes = merged.field.memoryBytes();
+  statistics.mediumHash = merged.key.mediumHash;
+  const Stopwatch writing;
+  estimators::writeLightCache(output, merged.field, merged.key);
+  statistics.seconds.write = writing.seconds();
+  statistics.seconds.total = total.seconds();
+  statistics.cpuSeconds = processCpuSeconds() - cpuBefore;
+  statistics.peakMemoryBytes = peakMemoryBytes();
   return statistics;
 }
 

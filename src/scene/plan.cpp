@@ -93,7 +93,7 @@ class RayCost {
       }
     const Stopwatch watch;
     for (const render::Crop& crop : crops)
-      m_some->render(source, 0, crop);
+      m_some->renderCrop(source, 0, crop);
     return watch.seconds() / rays * m_rays;
   }
 

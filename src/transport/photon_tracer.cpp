@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <optional>
 
+#include "photosphere/core/interrupt.h"
 #include "photosphere/core/parallel.h"
 #include "photosphere/core/progress.h"
+#include "photosphere/core/resources.h"
 #include "photosphere/core/sampling.h"
 #include "photosphere/transport/scatter.h"
 #include "photosphere/transport/tracking.h"
@@ -401,6 +403,30 @@ void traceChunk(const Medium& medium, const Births& births, const FlightTimes& t
 
 }  // namespace
 
+namespace {
+
+std::uint64_t chunksOf(std::uint64_t photons) {
+  return (photons + kPhotonsPerChunk - 1) / kPhotonsPerChunk;
+}
+
+// Chunks that are traced between two pauses: about half a second's.
+class SliceLength {
+ public:
+  explicit SliceLength(bool pauses) : m_chunks(pauses ? 16 : ~0ull) {}
+  std::uint64_t chunks() const { return m_chunks; }
+  void took(double seconds) {
+    if (m_chunks == ~0ull) return;
+    const double factor = std::clamp(0.5 / std::max(seconds, 1e-3), 0.25, 4.0);
+    m_chunks = std::max<std::uint64_t>(
+        1, static_cast<std::uint64_t>(std::min(factor * static_cast<double>(m_chunks), 1e9)));
+  }
+
+ private:
+  std::uint64_t m_chunks;
+};
+
+}  // namespace
+
 TraceStatistics tracePhotons(const Medium& medium, const LightList& lights,
                              const TraceOptions& options, FlightSink& sink) {
   TraceStatistics total;
@@ -413,21 +439,36 @@ TraceStatistics tracePhotons(const Medium& medium, const LightList& lights,
   const auto trace = medium.isMoving() ? traceChunk<Moment> : traceChunk<Still>;
   const std::uint64_t first = std::min(options.firstPhoton, options.photons);
   const std::uint64_t count = std::min(options.photonCount, options.photons - first);
-  const std::uint64_t chunks = (count + kPhotonsPerChunk - 1) / kPhotonsPerChunk;
-  std::vector<TraceStatistics> parts(chunks);
+  const std::uint64_t chunks = chunksOf(count);
+  TraceProgress done = options.begun;
   Progress progress("trace", count);
+  progress.add(done.photons);
+  std::optional<InterruptDelay> delay;
+  if (options.pause) delay.emplace();
+  SliceLength slice(options.pause != nullptr);
 
-  parallelFor(chunks, 1, [&](std::size_t beginChunk, std::size_t endChunk) {
-    for (std::size_t chunk = beginChunk; chunk < endChunk; ++chunk) {
-      const std::uint64_t begin = first + chunk * kPhotonsPerChunk;
-      const std::uint64_t end = std::min(begin + kPhotonsPerChunk, first + count);
-      trace(medium, births, times, options.key, window ? &*window : nullptr, begin, end, sink,
-            parts[chunk]);
-      progress.add(end - begin);
-    }
-  });
-  for (const TraceStatistics& part : parts)
-    accumulate(total, part);
+  for (std::uint64_t next = chunksOf(done.photons); next < chunks;) {
+    const std::uint64_t here = std::min(slice.chunks(), chunks - next);
+    std::vector<TraceStatistics> parts(here);
+    const Stopwatch watch;
+    parallelFor(here, 1, [&](std::size_t beginChunk, std::size_t endChunk) {
+      for (std::size_t chunk = beginChunk; chunk < endChunk; ++chunk) {
+        const std::uint64_t begin = (next + chunk) * kPhotonsPerChunk;
+        const std::uint64_t end = std::min(begin + kPhotonsPerChunk, count);
+        trace(medium, births, times, options.key, window ? &*window : nullptr, first + begin,
+              first + end, sink, parts[chunk]);
+        progress.add(end - begin);
+      }
+    });
+    // In the order of the photons, however they are sliced.
+    for (const TraceStatistics& part : parts)
+      accumulate(done.sums, part);
+    next += here;
+    done.photons = std::min(next * kPhotonsPerChunk, count);
+    slice.took(watch.seconds());
+    if (options.pause) options.pause(done);
+  }
+  total = done.sums;
   const double scale = options.photons > 0 ? 1.0 / static_cast<double>(options.photons) : 0.0;
   for (Vec3d* power :
        {&total.emitted, &total.missed, &total.absorbed, &total.escaped, &total.cappedPower})

@@ -254,17 +254,6 @@ TEST_F(Render, GoesOnToATargetError) {
   EXPECT_TRUE(image::exrIsComplete(m_folder / "b.0002.exr"));
 }
 
-TEST_F(Render, SignalEndsALongFrameWithoutTemporaries) {
-  const auto before = namesIn(m_folder.path());
-  const RunResult result = runShell(
-      std::string(PHOTOSPHERE_TOOL) +
-          " render scene.toml -o x.exr --frames 1 --res 1920x1080 -s render.samples=1000 & "
-          "sleep 1.5; kill -s TERM $!; wait $!",
-      m_folder.path());
-  EXPECT_EQ(result.exitCode, 143) << result.err;
-  EXPECT_EQ(namesIn(m_folder.path()), before);
-}
-
 // Hours of work must not end in a folder that cannot be written.
 TEST_F(Render, RefusesAnOutputThatCannotBeWrittenBeforeTheWork) {
   writeText(m_folder / "file", "");
@@ -313,9 +302,12 @@ const Refusal kRefusals[] = {
     {"Crop", {"render", "scene.toml", "-o", "x.####.exr", "--crop", "1,2,3"}, 2, "X0,Y0,X1,Y1"},
     {"CropEmpty", {"render", "scene.toml", "-o", "x.####.exr", "--crop", "5,5,5,9"}, 2, "empty"},
     {"Compression", {"render", "scene.toml", "-o", "x.####.exr", "--compression", "lzw"}, 2, "zip"},
-    {"Resume", {"render", "scene.toml", "-o", "x.####.exr", "--resume", "auto"}, 2, "not served"},
-    {"Shard", {"trace", "scene.toml", "-o", "x.####.vdb", "--shard", "1/2"}, 2, "not served"},
-    {"Merge", {"merge", "a.vdb", "b.vdb", "-o", "c.vdb"}, 2, "not served"},
+    {"ShardForm", {"trace", "scene.toml", "-o", "x.####.vdb", "--shard", "2"}, 2, "i/n"},
+    {"ShardBeyond", {"trace", "scene.toml", "-o", "x.####.vdb", "--shard", "3/2"}, 2, "--shard"},
+    {"ShardZero", {"trace", "scene.toml", "-o", "x.####.vdb", "--shard", "0/2"}, 2, "--shard"},
+    {"ResumeWhen", {"render", "scene.toml", "-o", "x.####.exr", "--resume", "yes"}, 2, "--resume"},
+    {"MergeNothing", {"merge", "-o", "c.vdb"}, 2, "SHARD"},
+    {"MergeIntoExr", {"merge", "a.vdb", "b.vdb", "-o", "c.exr"}, 2, "written as .vdb"},
     {"CacheMissing", {"render", "scene.toml", "-o", "x.exr", "--frames", "9"}, 3, "smoke.0009.vdb"},
     {"GridMissing",
      {"render", "scene.toml", "-o", "x.exr", "--frames", "1", "-s", "volume.0.density=smog"},

@@ -8,7 +8,17 @@ namespace photosphere {
 void installSignalHandlers();
 /// The signal that asked to stop, or 0.
 int pendingSignal();
-/// Throws InterruptedError when a signal asked to stop.
+/// Throws InterruptedError when a signal asked to stop, unless that is put off.
 void throwIfInterrupted();
+
+/// While one lives, throwIfInterrupted does not throw: work goes on to a point where what it has
+/// done can be kept. The second signal still ends the process.
+class InterruptDelay {
+ public:
+  InterruptDelay();
+  ~InterruptDelay();
+  InterruptDelay(const InterruptDelay&) = delete;
+  InterruptDelay& operator=(const InterruptDelay&) = delete;
+};
 
 }  // namespace photosphere

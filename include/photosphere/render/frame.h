@@ -8,6 +8,7 @@
 
 #include "photosphere/cameras/camera.h"
 #include "photosphere/cameras/moving_camera.h"
+#include "photosphere/core/checkpoint.h"
 #include "photosphere/lights/light.h"
 #include "photosphere/render/integrator.h"
 
@@ -38,6 +39,10 @@ struct FrameOptions {
   bool moving = false;       ///< something moves while the shutter is open
   transport::Shutter shutter;
   const cameras::MovingCamera* motion = nullptr;  ///< the camera over the shutter, where it moves
+  /// What an earlier run of the same frame had done, as `pause` was told; nullptr = nothing.
+  StateReader* begun = nullptr;
+  /// Called between bands of rows, and before an interruption: what the bands so far have made.
+  PausePoint pause;
 };
 
 /// Layers of a frame over its crop, row by row from the top, RGB interleaved as Rgb.
@@ -72,6 +77,8 @@ class FrameMean {
   int count() const { return m_count; }
   /// The mean; counts of bad samples and of the integrator are sums. Empty before the first frame.
   FrameLayers mean() const;
+  void keep(StateWriter& w) const;
+  void resume(StateReader& r);
 
  private:
   FrameLayers m_sum;  // from two frames on, depth holds the sum of alpha times depth

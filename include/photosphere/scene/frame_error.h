@@ -4,6 +4,7 @@
 #include <array>
 #include <vector>
 
+#include "photosphere/core/checkpoint.h"
 #include "photosphere/core/types.h"
 
 namespace photosphere::scene {
@@ -47,6 +48,8 @@ class FrameError {
   ErrorEstimate estimate() const;
   /// Standard error of the mean, pixel by pixel and channel by channel [W m^-2 sr^-1].
   std::vector<Rgb> standardError() const;
+  void keep(StateWriter& w) const;
+  void resume(StateReader& r);
 
  private:
   // Mean and sum of squared deviations (Welford 1962) of the pixels of one size.

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "photosphere/core/checkpoint.h"
+#include "photosphere/estimators/light_shard.h"
 #include "photosphere/image/exr.h"
 #include "photosphere/image/image.h"
 #include "photosphere/render/frame.h"
@@ -22,6 +24,8 @@ struct RenderRequest {
   std::optional<std::int64_t> seed;
   std::optional<std::int64_t> cacheFrame;  ///< frame of the caches, where it differs
   bool allowStale = false;                 ///< use a light cache made for another medium or lights
+  std::optional<estimators::ShardNumber> shard;  ///< traceScene: these photons alone
+  Checkpoint* checkpoint = nullptr;              ///< goes on from it, and keeps what is done in it
 };
 
 /// Wall-clock seconds of each stage.
@@ -97,11 +101,17 @@ void writeFrame(FrameResult& result, const SceneFile& scene, const WriteRequest&
 /// is null.
 std::string statsJson(const FrameStatistics& statistics);
 
-/// Traces the light of a frame into a light cache (`photosphere trace`).
+/// Traces the light of a frame into a light cache, or into one shard of it (`photosphere trace`).
 /// @param output  .vdb; frame tokens are replaced
 /// @return statistics of that frame
 FrameStatistics traceScene(const SceneFile& scene, std::int64_t frame, const std::string& output,
                            const RenderRequest& request = {});
+
+/// Adds up the shards of a light cache (`photosphere merge`). @throws what mergeLightShards throws;
+/// OutputError
+/// @return what became of the photons; what the user should know goes to `notes`
+FrameStatistics mergeShards(const std::vector<std::filesystem::path>& shards,
+                            const std::string& output, std::vector<std::string>& notes);
 
 /// The frames that a scene asks for: scene.frames, else {1}.
 std::vector<std::int64_t> sceneFrames(const SceneFile& scene);

@@ -4,6 +4,7 @@
 // direction per event.
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <vector>
@@ -41,15 +42,6 @@ class FlightSink {
   virtual void consume(std::span<const Flight> flights) = 0;
 };
 
-struct TraceOptions {
-  std::uint64_t photons = 1'000'000;  ///< of the whole frame, over all lights
-  std::uint64_t firstPhoton = 0;      ///< of this shard
-  std::uint64_t photonCount = ~0ull;  ///< of this shard; clipped to the frame's
-  RandomKey key;
-  /// Steers births and flights; nullptr = photons of equal power. Must outlive the trace.
-  const PhotonGuide* guide = nullptr;
-};
-
 /// What became of the photons. Powers are per channel [W] of all the frame's light. Where photons
 /// are steered, what was emitted is an estimate too, and `absorbed` holds what roulette takes less
 /// what it gives.
@@ -63,6 +55,26 @@ struct TraceStatistics {
   Vec3d emitted{0.0}, missed{0.0}, absorbed{0.0}, escaped{0.0}, cappedPower{0.0};
   /// emitted - missed - absorbed - escaped - capped: zero up to rounding.
   Vec3d imbalance() const { return emitted - missed - absorbed - escaped - cappedPower; }
+};
+
+/// How far a trace has got. Its flights are all in the sink.
+struct TraceProgress {
+  std::uint64_t photons = 0;  ///< done, from the first of the shard on
+  TraceStatistics sums;       ///< of these; powers not yet divided by the frame's photons
+};
+
+struct TraceOptions {
+  std::uint64_t photons = 1'000'000;  ///< of the whole frame, over all lights
+  std::uint64_t firstPhoton = 0;      ///< of this shard
+  std::uint64_t photonCount = ~0ull;  ///< of this shard; clipped to the frame's
+  RandomKey key;
+  /// Steers births and flights; nullptr = photons of equal power. Must outlive the trace.
+  const PhotonGuide* guide = nullptr;
+  /// What an earlier run of the same trace had done: its photons are not traced again.
+  TraceProgress begun;
+  /// Called about twice a second, with no flight under way; may throw InterruptedError. With it a
+  /// signal ends the trace nowhere else.
+  std::function<void(const TraceProgress&)> pause;
 };
 
 /// Events after which a path must pass a roulette of survival 0.999 at each further one (METHOD,

@@ -9,6 +9,7 @@
 #include "command.h"
 #include "frame_loop.h"
 #include "photosphere/core/error.h"
+#include "photosphere/core/interrupt.h"
 #include "photosphere/core/log.h"
 #include "photosphere/core/resources.h"
 #include "photosphere/image/exr.h"
@@ -58,6 +59,7 @@ void renderOne(const scene::SceneFile& scene, std::int64_t frame, Options& optio
   log::info("frame {}: plan: {}", frame, scene::planLine(result.statistics.effects));
   for (const std::string& note : result.notes)
     log::info("frame {}: {}", frame, note);
+  const InterruptDelay delay;  // what is rendered is written
   scene::writeFrame(result, scene, options.write);
   const scene::FrameStatistics& s = result.statistics;
   const std::string path = framePath(options.write.path, frame);
@@ -76,7 +78,9 @@ int renderFrames(const scene::SceneFile& scene, Options& options) {
   empty.volumes.clear();
   StatsFile stats(options.scene.stats, frames.size());
   bool planned = false;
-  const int code = runFrames(frames, options.scene.frames.keepGoing, [&](std::int64_t frame) {
+  ResumableJob job =
+      resumableJob(scene, options.scene, "render " + options.crop, frames, options.write.path);
+  const auto render = [&](std::int64_t frame) {
     const std::string path = framePath(options.write.path, frame);
     if (options.scene.frames.skipExisting && image::exrIsComplete(path))
       return printLine("frame {}: {} exists and is complete, skipped", frame, path);
@@ -86,11 +90,18 @@ int renderFrames(const scene::SceneFile& scene, Options& options) {
     std::int64_t cacheFrame = frame;
     const bool smoke = cacheFrames.map(frame, cacheFrame);
     if (cacheFrame != frame) request.cacheFrame = cacheFrame;
-    if (!options.scene.frames.dryRun)
-      return renderOne(smoke ? scene : empty, frame, options, request, stats);
-    if (smoke && !std::exchange(planned, true)) printPlan(scene, frame, request, false);
-    printDryRun(frame, path, cacheFrame, smoke);
-  });
+    if (options.scene.frames.dryRun) {
+      if (smoke && !std::exchange(planned, true)) printPlan(scene, frame, request, false);
+      return printDryRun(frame, path, cacheFrame, smoke);
+    }
+    if (job.hadFinished(frame) && image::exrIsComplete(path))
+      return printLine("frame {}: {} was finished before the interruption", frame, path);
+    request.checkpoint = &job.begin(frame);
+    renderOne(smoke ? scene : empty, frame, options, request, stats);
+    job.finished(frame);
+  };
+  const int code =
+      job.run([&] { return runFrames(frames, options.scene.frames.keepGoing, render); });
   if (code != static_cast<int>(ExitCode::ok) || !options.targetMissed) return code;
   return static_cast<int>(ExitCode::accuracy);
 }

@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <memory>
+#include <optional>
 
 #include "command.h"
 #include "frame_loop.h"
@@ -11,7 +12,6 @@
 #include "photosphere/core/log.h"
 #include "photosphere/core/resources.h"
 #include "photosphere/scene/pipeline.h"
-#include "photosphere/volume/vdb_file.h"
 #include "plugin_text.h"
 #include "print.h"
 #include "scene_options.h"
@@ -23,12 +23,17 @@ namespace {
 
 struct Options {
   SceneOptions scene;
-  std::string output;
+  std::string output, shard;
 };
 
-bool isComplete(const std::string& path) {
-  std::string reason;
-  return std::filesystem::is_regular_file(path) && volume::probeVdb(path, reason);
+std::optional<estimators::ShardNumber> parseShard(const std::string& text) {
+  if (text.empty()) return std::nullopt;
+  const auto n = parseInts("--shard", text, '/', 2, "i/n, such as 2/16");
+  if (n[0] < 1 || n[1] < 1 || n[0] > n[1] || n[1] > estimators::kMostShards)
+    throw ConfigError(fmt::format("--shard {}: shards are numbered from 1/n to n/n, n at most {}",
+                                  text, estimators::kMostShards));
+  return estimators::ShardNumber{static_cast<std::uint64_t>(n[0]),
+                                 static_cast<std::uint64_t>(n[1])};
 }
 
 void traceOne(const scene::SceneFile& scene, std::int64_t frame, const Options& options,
@@ -49,19 +54,29 @@ int traceFrames(const scene::SceneFile& scene, const Options& options) {
   const CacheFrames cacheFrames(scene, options.scene);
   StatsFile stats(options.scene.stats, frames.size());
   bool planned = false;
-  return runFrames(frames, options.scene.frames.keepGoing, [&](std::int64_t frame) {
+  ResumableJob job =
+      resumableJob(scene, options.scene, "trace " + options.shard, frames, options.output);
+  const auto trace = [&](std::int64_t frame) {
     const std::string path = framePath(options.output, frame);
-    if (options.scene.frames.skipExisting && isComplete(path))
+    if (options.scene.frames.skipExisting && vdbIsComplete(path))
       return printLine("frame {}: {} exists and is complete, skipped", frame, path);
     scene::RenderRequest request;
+    request.shard = parseShard(options.shard);
     std::int64_t cacheFrame = frame;
     if (!cacheFrames.map(frame, cacheFrame))
       return printLine("frame {}: outside the caches' frames, no light to trace", frame);
     if (cacheFrame != frame) request.cacheFrame = cacheFrame;
-    if (!options.scene.frames.dryRun) return traceOne(scene, frame, options, request, stats);
-    if (!std::exchange(planned, true)) printPlan(scene, frame, request, true);
-    printDryRun(frame, path, cacheFrame, true);
-  });
+    if (options.scene.frames.dryRun) {
+      if (!std::exchange(planned, true)) printPlan(scene, frame, request, true);
+      return printDryRun(frame, path, cacheFrame, true);
+    }
+    if (job.hadFinished(frame) && vdbIsComplete(path))
+      return printLine("frame {}: {} was finished before the interruption", frame, path);
+    request.checkpoint = &job.begin(frame);
+    traceOne(scene, frame, options, request, stats);
+    job.finished(frame);
+  };
+  return job.run([&] { return runFrames(frames, options.scene.frames.keepGoing, trace); });
 }
 
 int runTrace(const Options& options) {
@@ -70,6 +85,7 @@ int runTrace(const Options& options) {
     printLine("{}", scene::dumpScene(scene));
     return static_cast<int>(ExitCode::ok);
   }
+  parseShard(options.shard);
   if (options.output.empty()) throw ConfigError("no output; give -o light.vdb");
   if (std::filesystem::path(options.output).extension() != ".vdb")
     throw ConfigError(options.output + ": a light cache is written as .vdb");
@@ -81,7 +97,8 @@ std::function<int()> declareTrace(CLI::App& app) {
   app.add_option("-o,--output", options->output, "Light cache to write, with #### for frames")
       ->type_name("LIGHT.vdb");
   addSceneOptions(app, options->scene);
-  app.add_option("--shard", options->scene.shard, "Part i of n of the photons (not served yet)")
+  app.add_option("--shard", options->shard,
+                 "Trace part i of n of the photons; `photosphere merge` adds the parts up")
       ->type_name("i/n");
   app.footer([] {
     return "Keys of the estimator, which -s/--set overrides (all keys: photosphere render "

@@ -1,0 +1,145 @@
+#pragma once
+// Checkpoints: what long work has done so far, kept on disk so that the same work can go on after a
+// signal, a kill or a power cut, to the same bits.
+
+#include <chrono>
+#include <cstdint>
+#include <cstring>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+namespace photosphere {
+
+/// Values one after another as bytes of this machine. A checkpoint is read by the build that wrote
+/// it, so there is no other form to agree on.
+class StateWriter {
+ public:
+  /// @param bytes  to go on after
+  explicit StateWriter(std::string bytes = {}) : m_bytes(std::move(bytes)) {}
+  template <class T>
+  requires std::is_trivially_copyable_v<T>
+  void value(const T& v) { m_bytes.append(reinterpret_cast<const char*>(&v), sizeof v); }
+  template <class T>
+  requires std::is_trivially_copyable_v<T>
+  void values(const std::vector<T>& v) {
+    value(static_cast<std::uint64_t>(v.size()));
+    if (!v.empty()) m_bytes.append(reinterpret_cast<const char*>(v.data()), v.size() * sizeof(T));
+  }
+  void text(std::string_view s) {
+    value(static_cast<std::uint64_t>(s.size()));
+    m_bytes.append(s);
+  }
+  std::string take() { return std::move(m_bytes); }
+
+ private:
+  std::string m_bytes;
+};
+
+/// Reads back what a StateWriter wrote, in the same order.
+/// @throws InputError naming the file where the bytes end early
+class StateReader {
+ public:
+  StateReader(std::string file, std::string bytes)
+      : m_file(std::move(file)), m_bytes(std::move(bytes)) {}
+  template <class T>
+  requires std::is_trivially_copyable_v<T>
+  void value(T& v) { std::memcpy(static_cast<void*>(&v), take(1, sizeof v), sizeof v); }
+  template <class T>
+  T value() {
+    T v{};
+    value(v);
+    return v;
+  }
+  template <class T>
+  requires std::is_trivially_copyable_v<T>
+  void values(std::vector<T>& v) {
+    const auto count = value<std::uint64_t>();
+    const char* from = take(count, sizeof(T));
+    v.resize(static_cast<std::size_t>(count));
+    if (count > 0) std::memcpy(static_cast<void*>(v.data()), from, v.size() * sizeof(T));
+  }
+  std::string text() {
+    const auto count = value<std::uint64_t>();
+    const char* from = take(count, 1);
+    return {from, static_cast<std::size_t>(count)};
+  }
+  bool atEnd() const { return m_at == m_bytes.size(); }
+  [[noreturn]] void fail() const;
+
+ private:
+  const char* take(std::uint64_t count, std::size_t size);
+
+  std::string m_file, m_bytes;
+  std::size_t m_at = 0;
+};
+
+/// Says all that is done of some work.
+using WriteState = std::function<void(StateWriter&)>;
+/// What long work calls wherever all that it has done can be said. It may keep that, and ends the
+/// work by InterruptedError when a signal asked for it. Empty = nobody keeps anything.
+using PausePoint = std::function<void(const WriteState&)>;
+
+/// When work goes on from a checkpoint.
+enum class Resume {
+  automatic,  ///< where there is one of the same work; another is left behind, with a warning
+  never,      ///< what is there is dropped
+  require,    ///< it is an error if there is none of the same work
+};
+
+/// The checkpoint of one output: a folder beside it, with a file for each part of the work. Every
+/// file is written whole or not at all, and read only if it is unhurt and of the same work.
+class Checkpoint {
+ public:
+  /// The folder of an output's checkpoint: its path and `.checkpoint`.
+  static std::filesystem::path folderOf(const std::filesystem::path& output);
+
+  /// @param interval  seconds between periodic saves, at least; more where saving is slow
+  Checkpoint(std::filesystem::path folder, double interval, Resume resume);
+
+  /// Names the work: files of another are not gone on from. Must be called before `load` and
+  /// `offer`.
+  /// @throws InputError (Resume::require) when the folder holds the checkpoint of other work
+  void identify(const std::string& work);
+
+  /// What an earlier run kept under that name; nothing where there is none.
+  std::optional<StateReader> load(const std::string& part);
+
+  /// Keeps a part: when a signal is pending, after which InterruptedError is thrown, or when the
+  /// last save of any part is long enough ago.
+  void offer(const std::string& part, const WriteState& write);
+  /// Keeps a part now. What cannot be written is a warning: the work itself is not hurt.
+  void save(const std::string& part, const WriteState& write);
+  /// Text to be kept beside the first part that is saved; see `note`.
+  void noteAlong(std::string text) { m_note = std::move(text); }
+  /// Keeps that text now, where it is not kept yet.
+  void saveNote();
+  /// The text that an earlier run kept, or nothing.
+  static std::optional<std::string> note(const std::filesystem::path& folder);
+
+  /// True once something was kept or found that a further run can go on from.
+  bool exists() const;
+  const std::filesystem::path& folder() const { return m_folder; }
+  /// The work is done: removes the folder.
+  void discard();
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  std::filesystem::path fileOf(const std::string& part) const;
+  void drop();
+
+  std::filesystem::path m_folder;
+  double m_interval;
+  Resume m_resume;
+  std::string m_work, m_note;
+  bool m_warned = false, m_noteKept = false;
+  Clock::time_point m_last = Clock::now();
+  double m_saveSeconds = 0;
+};
+
+}  // namespace photosphere

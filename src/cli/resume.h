@@ -1,0 +1,60 @@
+#pragma once
+// Jobs over frames that can be interrupted and go on: --resume, --checkpoint-interval, exit 75.
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "photosphere/core/checkpoint.h"
+
+namespace CLI {
+class App;
+}
+
+namespace photosphere::cli {
+
+struct ResumeOptions {
+  std::string when = "auto";
+  double interval = 60;  ///< between periodic checkpoints [s]
+};
+
+void addResumeOptions(CLI::App& app, ResumeOptions& options);
+
+/// The checkpoints of a job, one beside the output of the frame under way. It also holds which
+/// frames the job had finished, so that the same command goes on where it was stopped.
+class ResumableJob {
+ public:
+  using OutputOf = std::function<std::string(std::int64_t)>;
+
+  /// @param identity  of the job: scene and options, on one line; finished frames of another job
+  ///                  are made again
+  /// @throws InputMissingError (require) when no output of these frames has a checkpoint
+  ResumableJob(const ResumeOptions& options, std::string identity,
+               const std::vector<std::int64_t>& frames, OutputOf outputOf);
+
+  /// True when the interrupted run had finished this frame; its file must still be looked at.
+  bool hadFinished(std::int64_t frame) const { return m_earlier.count(frame) != 0; }
+  /// Begins a frame. The checkpoint is the job's.
+  Checkpoint& begin(std::int64_t frame);
+  /// The frame is on disk: its checkpoint is removed.
+  void finished(std::int64_t frame);
+
+  /// Runs the job. @return its exit code, or 75 after an interruption, of which the user is told
+  int run(const std::function<int()>& body);
+
+ private:
+  void keepFinished();
+
+  ResumeOptions m_options;
+  Resume m_when;
+  std::string m_identity;
+  std::vector<std::int64_t> m_frames;
+  OutputOf m_outputOf;
+  std::set<std::int64_t> m_earlier, m_finished;
+  std::optional<Checkpoint> m_current;
+};
+
+}  // namespace photosphere::cli

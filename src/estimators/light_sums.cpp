@@ -1,0 +1,200 @@
+#include "photosphere/estimators/light_sums.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+
+#include "deposit.h"
+#include "photosphere/core/error.h"
+#include "photosphere/core/fixed_point.h"
+#include "photosphere/core/log.h"
+#include "photosphere/core/parallel.h"
+#include "photosphere/core/resources.h"
+#include "voxel_lookup.h"
+
+namespace photosphere::estimators {
+
+using transport::Medium;
+using transport::TraceProgress;
+using transport::TraceStatistics;
+
+namespace {
+
+constexpr const char* kPart = "light";
+// Light that took less to trace is traced again rather than kept [s].
+constexpr double kWorthKeeping = 1.0;
+
+[[noreturn]] void failOverflow(std::uint64_t times) {
+  throw Error(ExitCode::unspecified,
+              fmt::format("{} photon deposits overflowed their 64-bit sums; lower "
+                          "estimator.photons or raise estimator.light_voxel",
+                          times));
+}
+
+int marginOf(const LightFieldLayout& layout, double edge) {
+  return static_cast<int>(std::ceil(layout.radius / edge)) + 1;
+}
+
+// The quantum is fixed by the scene (METHOD.md section 6): its power, times the smoke's diameter
+// where powers are multiplied by lengths.
+double quantumOf(const Medium& medium, const transport::LightList& lights, bool power) {
+  const double shared = transport::sharedPower(medium, lights);
+  const double length = power ? 1.0 : 2.0 * transport::boundingSphere(medium).radius;
+  return shared > 0 && length > 0 ? shared * length * 0x1p-24 : 1.0;
+}
+
+transport::SupportLattice latticeOf(const Medium& medium, const LightFieldLayout& layout,
+                                    const View& view) {
+  const double edge = layout.lightVoxel * medium.voxelEdge();
+  std::function<bool(const Vec3d&)> seen;
+  // Two blurs and a reading between voxels; three radii, as a wider kernel may ask again.
+  const double reach = 3.0 * layout.radius + 3.0 * edge;
+  if (!view.planes.empty()) seen = [&view, reach](const Vec3d& p) { return view.sees(p, reach); };
+  return transport::SupportLattice(medium, edge, marginOf(layout, edge), seen);
+}
+
+// One trace into sums, which a checkpoint may hold part of.
+class Tracing {
+ public:
+  Tracing(LightSums& light, Checkpoint* checkpoint, std::uint64_t part)
+      : m_light(light), m_checkpoint(checkpoint), m_part(part) {
+    m_sums.quantum = light.quantum;
+    m_sums.sums.assign(light.places() * static_cast<std::size_t>(light.layout.valuesPerCarrier()),
+                       0);
+  }
+
+  TraceStatistics run(const Medium& medium, const transport::LightList& lights, const View& view,
+                      transport::TraceOptions options) {
+    const CarrierSums carriers(medium, lights, m_light.layout, view, options.key, m_sums);
+    if (!m_light.layout.holdsPower()) {
+      VoxelSink sink(carriers, m_light.layout.deposit, m_light.lattice);
+      return trace(medium, lights, options, sink);
+    }
+    const ParticleIndex index(m_light.particles, m_light.layout.depositRadius);
+    ParticleSink sink(carriers, m_light.layout, m_light.particles, index);
+    m_particles = &sink;
+    return trace(medium, lights, options, sink);
+  }
+
+ private:
+  TraceStatistics trace(const Medium& medium, const transport::LightList& lights,
+                        transport::TraceOptions& options, transport::FlightSink& sink) {
+    const WriteState write = [this](StateWriter& w) { keep(w); };
+    if (m_checkpoint) {
+      resume();
+      options.begun = m_done;
+      options.pause = [&](const TraceProgress& done) {
+        m_done = done;
+        m_checkpoint->offer(kPart, write);
+      };
+    }
+    const Stopwatch watch;
+    const TraceStatistics statistics = transport::tracePhotons(medium, lights, options, sink);
+    if (m_sums.overflows > 0) failOverflow(m_sums.overflows);
+    // What comes next keeps the picture, not the light that it is made from.
+    if (m_checkpoint && watch.seconds() > kWorthKeeping) m_checkpoint->save(kPart, write);
+    m_light.farPhotons = farPhotons();
+    m_light.sums = std::move(m_sums.sums);
+    return statistics;
+  }
+
+  std::uint64_t farPhotons() const {
+    return m_farBefore + (m_particles ? m_particles->farPhotons() : 0);
+  }
+
+  void keep(StateWriter& w) const {
+    w.value(m_part);
+    w.value(m_done);
+    w.value(farPhotons());
+    w.value(m_sums.overflows.load());
+    w.values(m_sums.sums);
+  }
+
+  void resume() {
+    std::optional<StateReader> kept = m_checkpoint->load(kPart);
+    if (!kept || kept->value<std::uint64_t>() != m_part) return;
+    kept->value(m_done);
+    kept->value(m_farBefore);
+    m_sums.overflows = kept->value<std::uint64_t>();
+    const std::size_t size = m_sums.sums.size();
+    kept->values(m_sums.sums);
+    if (m_sums.sums.size() != size) kept->fail();
+    log::info("light goes on from {} photons", m_done.photons);
+  }
+
+  LightSums& m_light;
+  Checkpoint* m_checkpoint;
+  std::uint64_t m_part;
+  std::uint64_t m_farBefore = 0;              // of earlier runs
+  const ParticleSink* m_particles = nullptr;  // while photons are traced onto particles
+  TraceProgress m_done;
+  FixedSums m_sums;
+};
+
+}  // namespace
+
+LightSums traceLightSums(const Medium& medium, const transport::LightList& lights,
+                         const LightFieldLayout& layout, const View& view,
+                         const std::vector<Vec3f>& particles,
+                         const transport::TraceOptions& options, TraceStatistics& statistics,
+                         Checkpoint* checkpoint, std::uint64_t part) {
+  checkLayout(layout);
+  LightSums light;
+  light.layout = layout;
+  light.photons = options.photons;
+  light.firstPhoton = std::min(options.firstPhoton, options.photons);
+  light.photonCount = std::min(options.photonCount, options.photons - light.firstPhoton);
+  if (layout.carrier == Carrier::particles) {
+    if (particles.empty())
+      throw ConfigError(
+          "estimator.carrier = \"particles\": the volume has no particles; `photosphere "
+          "convert` seeds them in a grid, or use carrier = \"voxels\"");
+    light.particles = particles;
+  }
+  light.quantum = quantumOf(medium, lights, layout.holdsPower());
+  if (!layout.holdsPower()) light.lattice = latticeOf(medium, layout, view);
+  statistics = Tracing(light, checkpoint, part).run(medium, lights, view, options);
+  return light;
+}
+
+void addSums(LightSums& into, const LightSums& other) {
+  std::atomic<std::uint64_t> overflows{0};
+  parallelFor(into.sums.size(), 1 << 16, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i)
+      if (!addChecked(into.sums[i], other.sums[i])) ++overflows;
+  });
+  if (overflows > 0) failOverflow(overflows);
+  into.photonCount += other.photonCount;
+  into.firstPhoton = std::min(into.firstPhoton, other.firstPhoton);
+  into.farPhotons += other.farPhotons;
+}
+
+LightField toField(LightSums light) {
+  LightField field;
+  field.layout = light.layout;
+  field.lattice = std::move(light.lattice);
+  field.particles = std::move(light.particles);
+  field.photons = light.photons;
+  field.farPhotons = light.farPhotons;
+  const double edge = field.lattice.edge();
+  const double volume = field.layout.holdsPower() ? 1.0 : edge * edge * edge;
+  const double worth =
+      1.0 / (static_cast<double>(std::max<std::uint64_t>(1, light.photons)) * volume);
+  field.values.resize(light.sums.size());
+  parallelFor(field.values.size(), 1 << 16, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i)
+      field.values[i] =
+          static_cast<float>(static_cast<double>(light.sums[i]) * light.quantum * worth);
+  });
+  light.sums = {};
+  if (field.layout.carrier == Carrier::particles && !field.layout.holdsPower()) {
+    // Track lengths are gathered on voxels and read off at the particles (METHOD.md section 5.4).
+    field.values = sampleAtParticles(field, field.particles);
+    field.lattice = {};
+  }
+  return field;
+}
+
+}  // namespace photosphere::estimators

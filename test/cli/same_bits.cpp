@@ -1,0 +1,400 @@
+// The same scene and seed give the same pixels: for any number of threads, by shards, through a
+// light cache, and after an interruption.
+
+#include <cstring>
+
+#include "fixture.h"
+
+namespace photosphere::test {
+namespace {
+
+constexpr const char* kScene = R"([scene]
+seed_per_frame = false
+[camera]
+position = [0.6, 0.5, 5]
+look_at = [0.6, 0.5, 0.5]
+fov = 30
+resolution = [48, 36]
+[[volume]]
+file = "smoke.####.vdb"
+density_scale = 4
+phase = { type = "henyey_greenstein", g = 0.5 }
+[[light]]
+type = "point"
+position = [3, 3, 2]
+intensity = 50
+[[light]]
+type = "sphere"
+position = [-3, 1, 2]
+radius = 0.5
+intensity = 20
+color = [1, 0.5, 0.2]
+[estimator]
+photons = 30000
+)";
+
+class SameBits : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    writeSmokeFrames(m_folder, 3);
+    writeText(m_folder / "scene.toml", kScene);
+  }
+  RunResult run(std::vector<std::string> arguments, const std::vector<std::string>& more = {}) {
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return runTool(arguments, m_folder.path());
+  }
+  void expectSamePixels(const std::string& a, const std::string& b) {
+    const image::Image x = image::readExr(m_folder / a).image;
+    const image::Image y = image::readExr(m_folder / b).image;
+    ASSERT_EQ(x.channels().size(), y.channels().size());
+    for (std::size_t c = 0; c < x.channels().size(); ++c) {
+      ASSERT_EQ(x.channels()[c].name, y.channels()[c].name);
+      EXPECT_EQ(std::memcmp(x.channels()[c].pixels.data(), y.channels()[c].pixels.data(),
+                            x.pixelCount() * sizeof(float)),
+                0)
+          << a << " and " << b << " differ in " << x.channels()[c].name;
+    }
+  }
+  TemporaryFolder m_folder;
+};
+
+struct Way {
+  const char* name;
+  std::vector<std::string> options;
+  std::vector<std::string> more;  // of a run that takes long enough to be killed
+};
+void PrintTo(const Way& way, std::ostream* out) {
+  *out << way.name;
+}
+const std::vector<std::string> kManyPhotons{"-s", "estimator.photons=3000000", "-s",
+                                            "render.samples=300"};
+const std::vector<std::string> kSomePhotons{"-s", "estimator.photons=600000", "-s",
+                                            "render.samples=100"};
+const Way kWays[] = {
+    {"View", {}, kManyPhotons},
+    {"Histogram", {"-s", "estimator.basis=histogram"}, kManyPhotons},
+    {"Harmonics", {"-s", "estimator.basis=spherical_harmonics"}, kSomePhotons},
+    {"Gathered",
+     {"-s", "estimator.basis=histogram", "-s", "estimator.final_gather=4"},
+     {"-s", "estimator.photons=1000000", "-s", "render.samples=60", "-s",
+      "estimator.final_gather=120"}},
+    {"Paper",
+     {"-s", "estimator.preset=paper", "-s", "estimator.photons=3000"},
+     {"-s", "estimator.photons=40000", "-s", "render.samples=16"}},
+    {"Steered", {"-s", "estimator.importance=on"}, kSomePhotons},
+    {"PhotonMap",
+     {"-s", "estimator.type=photon_map", "-s", "estimator.passes=2"},
+     {"-s", "estimator.photons=200000", "-s", "estimator.passes=4", "-s", "render.samples=32"}},
+    {"Paths",
+     {"-s", "estimator.type=path_traced", "-s", "estimator.samples=20"},
+     {"-s", "estimator.samples=500"}},
+    {"TargetError",
+     {"--target-error", "0.3", "-s", "estimator.photons=8000"},
+     {"-s", "estimator.photons=400000", "-s", "render.samples=200"}},
+};
+
+class SameBitsOf : public SameBits, public ::testing::WithParamInterface<Way> {
+ protected:
+  std::vector<std::string> command(const std::string& output) const {
+    std::vector<std::string> all{"render", "scene.toml", "-o", output, "--frames", "1", "--float"};
+    all.insert(all.end(), GetParam().options.begin(), GetParam().options.end());
+    // Smoke as particles, which the paper's carriers are.
+    if (std::string(GetParam().name) == "Paper")
+      all.insert(all.end(), {"-s", "volume.0.file=points.vdb"});
+    return all;
+  }
+  void SetUp() override {
+    SameBits::SetUp();
+    if (std::string(GetParam().name) != "Paper") return;
+    ASSERT_EQ(run({"convert", "smoke.0001.vdb", "-o", "points.vdb", "--particles", "500"}).exitCode,
+              0);
+  }
+};
+
+TEST_P(SameBitsOf, OneTwoAndSevenThreads) {
+  for (const char* threads : {"1", "2", "7"}) {
+    const RunResult result = run(command(std::string(threads) + ".exr"), {"-j", threads});
+    ASSERT_EQ(result.exitCode, 0) << result.err;
+  }
+  expectSamePixels("1.exr", "2.exr");
+  expectSamePixels("1.exr", "7.exr");
+}
+
+// Killed as soon as a checkpoint is there, again and again.
+TEST_P(SameBitsOf, AfterKills) {
+  ASSERT_EQ(run(command("whole.exr"), GetParam().more).exitCode, 0);
+  std::string line = PHOTOSPHERE_TOOL;
+  for (const auto& part : {command("x.exr"), GetParam().more})
+    for (const std::string& argument : part)
+      line += " '" + argument + "'";
+  // Each run is left alone until it has kept more than the one before; the last one to its end.
+  const RunResult result = runShell(
+      "kills=0; while [ $kills -lt 3 ]; do touch mark; " + line +
+          " --checkpoint-interval 0.1 & pid=$!; "
+          "while kill -0 $pid 2> /dev/null && "
+          "[ -z \"$(find x.exr.checkpoint -type f -newer mark 2> /dev/null)\" ]; do sleep 0.01; "
+          "done; kill -9 $pid 2> /dev/null; wait $pid; [ $? -eq 0 ] && break; "
+          "kills=$((kills+1)); done; echo kills $kills; [ -e x.exr ] || " +
+          line,
+      m_folder.path());
+  ASSERT_EQ(result.exitCode, 0) << result.err;
+  EXPECT_EQ(result.out.find("kills 0"), std::string::npos) << "too quick to be killed";
+  EXPECT_NE(result.err.find("goes on from"), std::string::npos) << result.err;
+  expectSamePixels("whole.exr", "x.exr");
+  EXPECT_FALSE(fs::exists(m_folder / "x.exr.checkpoint"));
+}
+
+INSTANTIATE_TEST_SUITE_P(Estimators, SameBitsOf, ::testing::ValuesIn(kWays),
+                         [](const auto& way) { return std::string(way.param.name); });
+
+TEST_F(SameBits, ThroughALightCache) {
+  for (const char* basis : {"histogram", "spherical_harmonics"}) {
+    const std::vector<std::string> set{"-s", std::string("estimator.basis=") + basis};
+    ASSERT_EQ(run({"trace", "scene.toml", "-o", "l.vdb", "--frames", "2"}, set).exitCode, 0);
+    ASSERT_EQ(
+        run({"render", "scene.toml", "-o", "a.exr", "--frames", "2", "--float"}, set).exitCode, 0);
+    ASSERT_EQ(run({"render", "scene.toml", "-o", "b.exr", "--frames", "2", "--float", "-s",
+                   "estimator.cache=l.vdb"})
+                  .exitCode,
+              0);
+    expectSamePixels("a.exr", "b.exr");
+  }
+}
+
+class Shards : public SameBits {
+ protected:
+  // @return the files, in order
+  std::vector<std::string> trace(int count, const std::vector<std::string>& more = {}) {
+    std::vector<std::string> files;
+    for (int i = 1; i <= count; ++i) {
+      const std::string number = std::to_string(i) + "/" + std::to_string(count);
+      files.push_back("s" + std::to_string(i) + "of" + std::to_string(count) + ".vdb");
+      const RunResult result = run(
+          {"trace", "scene.toml", "-o", files.back(), "--frames", "1", "--shard", number}, more);
+      EXPECT_EQ(result.exitCode, 0) << result.err;
+    }
+    return files;
+  }
+  RunResult merge(std::vector<std::string> files, const std::string& output = "merged.vdb") {
+    files.insert(files.begin(), "merge");
+    return run(files, {"-o", output});
+  }
+  void render(const std::string& cache, const std::string& output) {
+    const RunResult result = run({"render", "scene.toml", "-o", output, "--frames", "1", "--float",
+                                  "-s", "estimator.cache=" + cache});
+    ASSERT_EQ(result.exitCode, 0) << result.err;
+  }
+};
+
+TEST_F(Shards, MergeInAnyOrderToTheBitsOfOneTrace) {
+  struct Layout {
+    const char* smoke;
+    std::vector<std::string> options;
+  };
+  ASSERT_EQ(run({"convert", "smoke.0001.vdb", "-o", "points.vdb", "--particles", "300"}).exitCode,
+            0);
+  for (const Layout& layout :
+       {Layout{"smoke.####.vdb", {}},
+        Layout{"smoke.####.vdb", {"-s", "estimator.basis=spherical_harmonics"}},
+        Layout{"points.vdb", {"-s", "estimator.carrier=particles"}},
+        Layout{"points.vdb",
+               {"-s", "estimator.carrier=particles", "-s", "estimator.deposit=collision", "-s",
+                "estimator.representative=mean"}}}) {
+    std::string text = kScene;
+    text.replace(text.find("smoke.####.vdb"), 14, layout.smoke);
+    writeText(m_folder / "scene.toml", text);
+    ASSERT_EQ(
+        run({"trace", "scene.toml", "-o", "one.vdb", "--frames", "1"}, layout.options).exitCode, 0);
+    render("one.vdb", "one.exr");
+    // The number matters to no layout more than to another: all are tried on the first.
+    for (const int count : layout.options.empty() ? std::vector{1, 3, 16} : std::vector{3}) {
+      std::vector<std::string> files = trace(count, layout.options);
+      for (int order = 0; order < 2; ++order) {
+        const RunResult result = merge(files);
+        ASSERT_EQ(result.exitCode, 0) << result.err;
+        render("merged.vdb", "merged.exr");
+        expectSamePixels("one.exr", "merged.exr");
+        std::reverse(files.begin(), files.end());
+        std::rotate(files.begin(), files.begin() + count / 3, files.end());
+      }
+    }
+  }
+}
+
+TEST_F(Shards, SumsCountsAndPowers) {
+  const auto files = trace(3);
+  ASSERT_EQ(run({"trace", "scene.toml", "-o", "one.vdb", "--frames", "1", "--stats", "one.json"})
+                .exitCode,
+            0);
+  std::vector<std::string> arguments{"merge", "-o", "merged.vdb", "--stats", "merged.json"};
+  arguments.insert(arguments.end(), files.begin(), files.end());
+  const RunResult result = run(arguments);
+  ASSERT_EQ(result.exitCode, 0) << result.err;
+  const std::string one = readText(m_folder / "one.json"), all = readText(m_folder / "merged.json");
+  const auto number = [](const std::string& text, const std::string& key) {
+    const std::size_t at = text.find('"' + key + '"');
+    return at == std::string::npos ? -1.0
+                                   : std::stod(text.substr(text.find_first_of("0123456789", at)));
+  };
+  for (const char* key : {"emitted", "scattered", "stored"})
+    EXPECT_EQ(number(one, key), number(all, key)) << key;
+  EXPECT_NEAR(number(one.substr(one.find("energy_watts")), "emitted"),
+              number(all.substr(all.find("energy_watts")), "emitted"), 1e-9);
+}
+
+TEST_F(Shards, MissingTwiceOrForeignOnesAreRefused) {
+  const auto files = trace(3);
+  RunResult result = merge({files[0], files[2]});
+  EXPECT_EQ(result.exitCode, 4);
+  EXPECT_NE(result.err.find("2/3"), std::string::npos) << result.err;
+  result = merge({files[0], files[1], files[2], files[1]});
+  EXPECT_EQ(result.exitCode, 4);
+  EXPECT_NE(result.err.find("second time"), std::string::npos) << result.err;
+  for (const char* change : {"scene.seed=5", "volume.0.density_scale=3", "light.0.intensity=51",
+                             "estimator.photons=30001", "estimator.rows=3"}) {
+    const auto [first, second] = std::pair{files[0], files[2]};
+    ASSERT_EQ(run({"trace", "scene.toml", "-o", "foreign.vdb", "--frames", "1", "--shard", "2/3",
+                   "-s", change})
+                  .exitCode,
+              0)
+        << change;
+    result = merge({first, "foreign.vdb", second});
+    EXPECT_EQ(result.exitCode, 4) << change;
+    EXPECT_NE(result.err.find("foreign.vdb: is a shard of another trace"), std::string::npos)
+        << change << ": " << result.err;
+  }
+  EXPECT_FALSE(fs::exists(m_folder / "merged.vdb"));
+  EXPECT_EQ(merge({"smoke.0001.vdb"}).exitCode, 4);
+  EXPECT_EQ(merge({"nothing.vdb"}).exitCode, 3);
+  // A shard is not yet a light cache, nor a light cache a shard.
+  result = run({"render", "scene.toml", "-o", "x.exr", "--frames", "1", "-s",
+                "estimator.cache=" + files[0]});
+  EXPECT_EQ(result.exitCode, 4);
+  EXPECT_NE(result.err.find("photosphere merge"), std::string::npos) << result.err;
+  ASSERT_EQ(run({"trace", "scene.toml", "-o", "whole.vdb", "--frames", "1"}).exitCode, 0);
+  EXPECT_EQ(merge({"whole.vdb"}).exitCode, 4);
+}
+
+TEST_F(Shards, SequencesMergeFrameByFrame) {
+  for (const char* i : {"1", "2"})
+    ASSERT_EQ(run({"trace", "scene.toml", "-o", std::string("s") + i + ".####.vdb", "--frames",
+                   "1-3", "--shard", std::string(i) + "/2"})
+                  .exitCode,
+              0);
+  ASSERT_EQ(run({"merge", "s2.####.vdb", "s1.####.vdb", "-o", "l.####.vdb"}).exitCode, 0);
+  const RunResult result = run({"render", "scene.toml", "-o", "x.####.exr", "--frames", "1-3", "-s",
+                                "estimator.cache=l.####.vdb"});
+  EXPECT_EQ(result.exitCode, 0) << result.err;
+  EXPECT_TRUE(fs::exists(m_folder / "x.0003.exr"));
+  EXPECT_EQ(run({"merge", "s2.####.vdb", "s1.####.vdb", "-o", "one.vdb"}).exitCode, 2);
+}
+
+TEST_F(Shards, OfATraceThatWasKilled) {
+  const std::string line = std::string(PHOTOSPHERE_TOOL) +
+                           " trace scene.toml -o x.vdb --frames 1 --shard 1/2 -s "
+                           "estimator.photons=8000000";
+  const RunResult whole = runShell(
+      std::string(PHOTOSPHERE_TOOL) +
+          " trace scene.toml -o a.vdb --frames 1 --shard 1/2 -s estimator.photons=8000000 && " +
+          std::string(PHOTOSPHERE_TOOL) +
+          " trace scene.toml -o b.vdb --frames 1 --shard 2/2 -s estimator.photons=8000000",
+      m_folder.path());
+  ASSERT_EQ(whole.exitCode, 0) << whole.err;
+  const RunResult killed = runShell(
+      line +
+          " --checkpoint-interval 0.1 & pid=$!; while kill -0 $pid 2> /dev/null && "
+          "[ ! -e x.vdb.checkpoint/light ]; do sleep 0.01; done; kill -9 $pid; wait $pid; " +
+          line + " --resume require",
+      m_folder.path());
+  ASSERT_EQ(killed.exitCode, 0) << killed.err;
+  EXPECT_NE(killed.err.find("goes on from"), std::string::npos) << killed.err;
+  ASSERT_EQ(merge({"a.vdb", "b.vdb"}, "ab.vdb").exitCode, 0);
+  ASSERT_EQ(merge({"b.vdb", "x.vdb"}, "xb.vdb").exitCode, 0);
+  render("ab.vdb", "ab.exr");
+  render("xb.vdb", "xb.exr");
+  expectSamePixels("ab.exr", "xb.exr");
+}
+
+// From here on: what a signal does.
+
+class Interrupted : public SameBits {
+ protected:
+  // Runs until the file appears, then sends the signal.
+  RunResult signalAt(const std::string& arguments, const std::string& file,
+                     const std::string& signal = "TERM") {
+    return runShell(std::string(PHOTOSPHERE_TOOL) + " " + arguments +
+                        " & pid=$!; while kill -0 $pid 2> /dev/null && [ ! -e " + file +
+                        " ]; do sleep 0.01; done; kill -s " + signal + " $pid; wait $pid",
+                    m_folder.path());
+  }
+};
+
+TEST_F(Interrupted, EndsWith75AndGoesOn) {
+  const std::string paths =
+      "render scene.toml -o x.exr --frames 1 --float -s estimator.type=path_traced -s "
+      "estimator.samples=160";
+  const RunResult stopped =
+      signalAt(paths + " --checkpoint-interval 0.1", "x.exr.checkpoint/frame");
+  ASSERT_EQ(stopped.exitCode, 75) << stopped.err;
+  EXPECT_NE(stopped.err.find("x.exr.checkpoint"), std::string::npos) << stopped.err;
+  EXPECT_FALSE(fs::exists(m_folder / "x.exr"));
+  EXPECT_EQ(namesIn(m_folder / "x.exr.checkpoint"), (std::set<std::string>{"frame"}));
+  // Other work does not go on from it, and says so.
+  RunResult result = runShell(
+      std::string(PHOTOSPHERE_TOOL) + " " + paths + " --seed 4 --resume require", m_folder.path());
+  EXPECT_EQ(result.exitCode, 4);
+  EXPECT_NE(result.err.find("other work"), std::string::npos) << result.err;
+  result =
+      runShell(std::string(PHOTOSPHERE_TOOL) + " " + paths + " --resume require", m_folder.path());
+  ASSERT_EQ(result.exitCode, 0) << result.err;
+  EXPECT_NE(result.err.find("goes on from"), std::string::npos) << result.err;
+  EXPECT_FALSE(fs::exists(m_folder / "x.exr.checkpoint"));
+  ASSERT_EQ(run({"render", "scene.toml", "-o", "whole.exr", "--frames", "1", "--float", "-s",
+                 "estimator.type=path_traced", "-s", "estimator.samples=160"})
+                .exitCode,
+            0);
+  expectSamePixels("whole.exr", "x.exr");
+  result =
+      runShell(std::string(PHOTOSPHERE_TOOL) + " " + paths + " --resume require", m_folder.path());
+  EXPECT_EQ(result.exitCode, 3);
+  EXPECT_NE(result.err.find("no checkpoint"), std::string::npos) << result.err;
+}
+
+// A checkpoint between two frames says which are done.
+TEST_F(Interrupted, FinishedFramesAreNotMadeAgain) {
+  const std::string job =
+      "render scene.toml -o x.####.exr --float --frames 1-3 -s "
+      "estimator.type=path_traced -s estimator.samples=160";
+  const RunResult stopped = signalAt(job, "x.0001.exr");
+  ASSERT_EQ(stopped.exitCode, 75) << stopped.err;
+  const auto written = fs::last_write_time(m_folder / "x.0001.exr");
+  const RunResult result = runShell(std::string(PHOTOSPHERE_TOOL) + " " + job, m_folder.path());
+  ASSERT_EQ(result.exitCode, 0) << result.err;
+  EXPECT_NE(result.out.find("x.0001.exr was finished before the interruption"), std::string::npos)
+      << result.out;
+  EXPECT_EQ(fs::last_write_time(m_folder / "x.0001.exr"), written);
+  for (const std::string& name : namesIn(m_folder.path()))
+    EXPECT_EQ(name.find("checkpoint"), std::string::npos) << name;
+  // Another job makes all its frames.
+  const RunResult other =
+      runShell(std::string(PHOTOSPHERE_TOOL) + " " + job + " --resume never", m_folder.path());
+  EXPECT_EQ(other.exitCode, 0) << other.err;
+  EXPECT_NE(fs::last_write_time(m_folder / "x.0001.exr"), written);
+}
+
+TEST_F(Interrupted, EverySignalLeavesAtMostACheckpoint) {
+  const auto before = namesIn(m_folder.path());
+  for (const char* signal : {"INT", "TERM", "USR1"}) {
+    const RunResult result = signalAt(
+        "trace scene.toml -o x.vdb --frames 1 -s estimator.photons=100000000 "
+        "--checkpoint-interval 0.1",
+        "x.vdb.checkpoint/light", signal);
+    EXPECT_EQ(result.exitCode, 75) << result.err;
+    std::error_code ignored;
+    EXPECT_TRUE(fs::remove_all(m_folder / "x.vdb.checkpoint", ignored));
+    EXPECT_EQ(namesIn(m_folder.path()), before) << result.err;
+  }
+}
+
+}  // namespace
+}  // namespace photosphere::test
