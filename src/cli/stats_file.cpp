@@ -1,5 +1,6 @@
 #include "stats_file.h"
 
+#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "photosphere/core/frames.h"
@@ -33,6 +34,18 @@ void StatsFile::add(std::int64_t frame, const std::string& output,
   if (hasFrameToken(m_path)) return write(framePath(m_path, frame), object);
   m_frames->push_back(std::move(object));
   write(m_path, m_single ? m_frames->front() : *m_frames);
+}
+
+void StatsFile::keep(std::int64_t frame) {
+  if (m_path.empty() || hasFrameToken(m_path)) return;
+  if (!m_earlier) {
+    std::ifstream in(m_path);
+    m_earlier = std::make_unique<Json>(Json::parse(in, nullptr, false));
+  }
+  if (!m_earlier->is_array()) return;
+  for (const Json& object : *m_earlier)
+    if (object.is_object() && object.contains("frame") && object["frame"] == frame)
+      m_frames->push_back(object);
 }
 
 }  // namespace photosphere::cli

@@ -21,11 +21,14 @@ class StatsFile {
   ~StatsFile();
   /// @throws OutputError
   void add(std::int64_t frame, const std::string& output, const scene::FrameStatistics& statistics);
+  /// Keeps what an interrupted run of the same job wrote of a frame that it had finished.
+  void keep(std::int64_t frame);
 
  private:
   std::string m_path;
   bool m_single = false;
   std::unique_ptr<nlohmann::ordered_json> m_frames;
+  std::unique_ptr<nlohmann::ordered_json> m_earlier;  // what was there before; null = not read yet
 };
 
 }  // namespace photosphere::cli

@@ -3,7 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <fstream>
+#include <cerrno>
+#include <cstring>
 #include <utility>
 
 #include "photosphere/core/error.h"
@@ -23,58 +24,109 @@ constexpr const char* kNoteFile = "job";
 // Saving takes at most this part of the time.
 constexpr double kSavingShare = 0.05;
 
-std::uint64_t hashOf(std::string_view bytes) {
-  Hasher hasher;
-  hasher.bytes(bytes.data(), bytes.size());
-  return hasher.value();
-}
-
-// Magic, size and hash of what follows; then the work's name and the part itself.
+// After the magic: size and hash of what follows, which is the work's name and the part itself.
 constexpr std::size_t kHead = kMagic.size() + 2 * sizeof(std::uint64_t);
+constexpr std::size_t kBlock = 1 << 20;  // that is hashed at once
 
-std::string sealed(std::string_view work, const WriteState& write) {
-  StateWriter state{std::string(kHead, '\0')};
-  state.text(work);
-  write(state);
-  std::string bytes = state.take();
-  const std::uint64_t size = bytes.size() - kHead;
-  const std::uint64_t hash = hashOf(std::string_view(bytes).substr(kHead));
-  std::memcpy(bytes.data(), kMagic.data(), kMagic.size());
-  std::memcpy(bytes.data() + kMagic.size(), &size, sizeof size);
-  std::memcpy(bytes.data() + kMagic.size() + sizeof size, &hash, sizeof hash);
-  return bytes;
+// Writes block by block: what is kept may be most of the memory.
+class FileWriter final : public StateWriter {
+ public:
+  explicit FileWriter(const fs::path& path) : m_out(path, std::ios::binary | std::ios::trunc) {
+    m_out.exceptions(std::ios::badbit | std::ios::failbit);
+    m_out << std::string(kHead, '\0');
+  }
+  void close() {
+    flush();
+    m_out.seekp(0);
+    m_out << kMagic;
+    const std::uint64_t hash = m_hasher.value();
+    m_out.write(reinterpret_cast<const char*>(&m_size), sizeof m_size);
+    m_out.write(reinterpret_cast<const char*>(&hash), sizeof hash);
+    m_out.close();
+  }
+
+ private:
+  void put(const void* data, std::size_t size) override {
+    const char* from = static_cast<const char*>(data);
+    while (size > 0) {
+      const std::size_t n = std::min(size, kBlock - m_block.size());
+      m_block.append(from, n);
+      from += n;
+      size -= n;
+      if (m_block.size() == kBlock) flush();
+    }
+  }
+  void flush() {
+    m_hasher.bytes(m_block.data(), m_block.size());
+    m_out.write(m_block.data(), static_cast<std::streamsize>(m_block.size()));
+    m_size += m_block.size();
+    m_block.clear();
+  }
+
+  std::ofstream m_out;
+  std::string m_block;
+  Hasher m_hasher;
+  std::uint64_t m_size = 0;
+};
+
+void writeSealed(const fs::path& path, std::string_view work, const WriteState& write) {
+  OutputFile file(path);
+  errno = 0;
+  try {
+    FileWriter out(file.temporaryPath());
+    out.text(work);
+    write(out);
+    out.close();
+  } catch (const std::ios_base::failure&) {
+    throw OutputError(path.string(), fmt::format("cannot be written: {}", std::strerror(errno)));
+  }
+  file.commit();
 }
 
-// What `sealed` holds, or nothing where it is hurt.
-std::optional<std::string> unsealed(const fs::path& path) {
+// What `writeSealed` wrote, after its head, or nothing where it is hurt.
+std::optional<StateReader> openSealed(const fs::path& path) {
   std::ifstream in(path, std::ios::binary);
-  if (!in) return std::nullopt;
   std::string head(kHead, '\0');
-  if (!in.read(head.data(), static_cast<std::streamsize>(kHead)) || !head.starts_with(kMagic))
+  if (!in || !in.read(head.data(), static_cast<std::streamsize>(kHead)) ||
+      !head.starts_with(kMagic))
     return std::nullopt;
   std::uint64_t size = 0, hash = 0;
-  std::memcpy(&size, head.data() + kMagic.size(), 8);
-  std::memcpy(&hash, head.data() + kMagic.size() + 8, 8);
+  std::memcpy(&size, head.data() + kMagic.size(), sizeof size);
+  std::memcpy(&hash, head.data() + kMagic.size() + sizeof size, sizeof hash);
   std::error_code error;
   if (fs::file_size(path, error) != size + kHead || error) return std::nullopt;
-  std::string content(static_cast<std::size_t>(size), '\0');
-  if (!in.read(content.data(), static_cast<std::streamsize>(size)) || hashOf(content) != hash)
-    return std::nullopt;
-  return content;
+  Hasher hasher;
+  std::string block;
+  for (std::uint64_t left = size; left > 0; left -= block.size()) {
+    block.resize(static_cast<std::size_t>(std::min<std::uint64_t>(left, kBlock)));
+    if (!in.read(block.data(), static_cast<std::streamsize>(block.size()))) return std::nullopt;
+    hasher.bytes(block.data(), block.size());
+  }
+  if (hasher.value() != hash) return std::nullopt;
+  in.seekg(static_cast<std::streamoff>(kHead));
+  return StateReader(path, std::move(in), size);
 }
 
 }  // namespace
 
 void StateReader::fail() const {
-  throw InputError(m_file, "is no checkpoint of this version; remove it, or use --resume never");
+  throw InputError(m_file.string(),
+                   "is no checkpoint of this version; remove it, or use --resume never");
 }
 
-const char* StateReader::take(std::uint64_t count, std::size_t size) {
-  const std::size_t left = m_bytes.size() - m_at;
-  if (count > left / size) fail();
-  const char* at = m_bytes.data() + m_at;
-  m_at += static_cast<std::size_t>(count) * size;
-  return at;
+void StateReader::get(void* to, std::uint64_t count, std::size_t size) {
+  if (count > m_left / size) fail();
+  const std::uint64_t bytes = count * size;
+  m_left -= bytes;
+  if (!m_in.read(static_cast<char*>(to), static_cast<std::streamsize>(bytes))) fail();
+}
+
+std::string StateReader::text() {
+  const auto count = value<std::uint64_t>();
+  if (count > m_left) fail();
+  std::string s(static_cast<std::size_t>(count), '\0');
+  get(s.data(), count, 1);
+  return s;
 }
 
 fs::path Checkpoint::folderOf(const fs::path& output) {
@@ -107,11 +159,11 @@ void Checkpoint::identify(const std::string& work) {
       fs::remove(entry.path(), error);
       continue;
     }
-    const std::optional<std::string> content = unsealed(entry.path());
+    std::optional<StateReader> kept = openSealed(entry.path());
     std::string why;
-    if (!content)
+    if (!kept)
       why = "is damaged";
-    else if (StateReader(entry.path().string(), *content).text() != m_work)
+    else if (kept->text() != m_work)
       why = "belongs to other work (scene, smoke, lights, options or version differ)";
     else
       continue;
@@ -123,12 +175,9 @@ void Checkpoint::identify(const std::string& work) {
 }
 
 std::optional<StateReader> Checkpoint::load(const std::string& part) {
-  const fs::path path = fileOf(part);
-  std::optional<std::string> content = unsealed(path);
-  if (!content) return std::nullopt;
-  StateReader reader(path.string(), std::move(*content));
-  if (reader.text() != m_work) return std::nullopt;
-  return reader;
+  std::optional<StateReader> kept = openSealed(fileOf(part));
+  if (!kept || kept->text() != m_work) return std::nullopt;
+  return kept;
 }
 
 void Checkpoint::offer(const std::string& part, const WriteState& write) {
@@ -142,7 +191,7 @@ void Checkpoint::save(const std::string& part, const WriteState& write) {
   const Clock::time_point start = Clock::now();
   try {
     saveNote();
-    writeFile(fileOf(part), sealed(m_work, write));
+    writeSealed(fileOf(part), m_work, write);
   } catch (const OutputError& error) {
     if (!std::exchange(m_warned, true)) log::warning("no checkpoint: {}", error.what());
   }
@@ -152,17 +201,15 @@ void Checkpoint::save(const std::string& part, const WriteState& write) {
 
 void Checkpoint::saveNote() {
   if (m_note.empty() || m_noteKept) return;
-  writeFile(fileOf(kNoteFile), sealed("", [&](StateWriter& w) { w.text(m_note); }));
+  writeSealed(fileOf(kNoteFile), "", [&](StateWriter& w) { w.text(m_note); });
   m_noteKept = true;
 }
 
 std::optional<std::string> Checkpoint::note(const fs::path& folder) {
-  const fs::path path = folder / kNoteFile;
-  std::optional<std::string> content = unsealed(path);
-  if (!content) return std::nullopt;
-  StateReader reader(path.string(), std::move(*content));
-  reader.text();  // the name of no work
-  return reader.text();
+  std::optional<StateReader> kept = openSealed(folder / kNoteFile);
+  if (!kept) return std::nullopt;
+  kept->text();  // the name of no work
+  return kept->text();
 }
 
 bool Checkpoint::exists() const {

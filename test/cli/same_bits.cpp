@@ -363,7 +363,7 @@ TEST_F(Interrupted, EndsWith75AndGoesOn) {
 // A checkpoint between two frames says which are done.
 TEST_F(Interrupted, FinishedFramesAreNotMadeAgain) {
   const std::string job =
-      "render scene.toml -o x.####.exr --float --frames 1-3 -s "
+      "render scene.toml -o x.####.exr --stats s.json --float --frames 1-3 -s "
       "estimator.type=path_traced -s estimator.samples=160";
   const RunResult stopped = signalAt(job, "x.0001.exr");
   ASSERT_EQ(stopped.exitCode, 75) << stopped.err;
@@ -375,6 +375,9 @@ TEST_F(Interrupted, FinishedFramesAreNotMadeAgain) {
   EXPECT_EQ(fs::last_write_time(m_folder / "x.0001.exr"), written);
   for (const std::string& name : namesIn(m_folder.path()))
     EXPECT_EQ(name.find("checkpoint"), std::string::npos) << name;
+  const std::string stats = readText(m_folder / "s.json");
+  for (const char* frame : {"\"frame\": 1,", "\"frame\": 2,", "\"frame\": 3,"})
+    EXPECT_NE(stats.find(frame), std::string::npos) << stats;
   // Another job makes all its frames.
   const RunResult other =
       runShell(std::string(PHOTOSPHERE_TOOL) + " " + job + " --resume never", m_folder.path());

@@ -4,8 +4,8 @@
 
 #include <chrono>
 #include <cstdint>
-#include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <functional>
 #include <optional>
 #include <string>
@@ -20,36 +20,34 @@ namespace photosphere {
 /// it, so there is no other form to agree on.
 class StateWriter {
  public:
-  /// @param bytes  to go on after
-  explicit StateWriter(std::string bytes = {}) : m_bytes(std::move(bytes)) {}
+  virtual ~StateWriter() = default;
   template <class T>
   requires std::is_trivially_copyable_v<T>
-  void value(const T& v) { m_bytes.append(reinterpret_cast<const char*>(&v), sizeof v); }
+  void value(const T& v) { put(&v, sizeof v); }
   template <class T>
   requires std::is_trivially_copyable_v<T>
   void values(const std::vector<T>& v) {
     value(static_cast<std::uint64_t>(v.size()));
-    if (!v.empty()) m_bytes.append(reinterpret_cast<const char*>(v.data()), v.size() * sizeof(T));
+    put(v.data(), v.size() * sizeof(T));
   }
   void text(std::string_view s) {
     value(static_cast<std::uint64_t>(s.size()));
-    m_bytes.append(s);
+    put(s.data(), s.size());
   }
-  std::string take() { return std::move(m_bytes); }
 
- private:
-  std::string m_bytes;
+ protected:
+  virtual void put(const void* data, std::size_t size) = 0;
 };
 
-/// Reads back what a StateWriter wrote, in the same order.
-/// @throws InputError naming the file where the bytes end early
+/// Reads back what a StateWriter wrote, in the same order, from a file that was found unhurt.
+/// @throws InputError naming the file where it ends early
 class StateReader {
  public:
-  StateReader(std::string file, std::string bytes)
-      : m_file(std::move(file)), m_bytes(std::move(bytes)) {}
+  StateReader(std::filesystem::path file, std::ifstream in, std::uint64_t bytes)
+      : m_file(std::move(file)), m_in(std::move(in)), m_left(bytes) {}
   template <class T>
   requires std::is_trivially_copyable_v<T>
-  void value(T& v) { std::memcpy(static_cast<void*>(&v), take(1, sizeof v), sizeof v); }
+  void value(T& v) { get(&v, 1, sizeof v); }
   template <class T>
   T value() {
     T v{};
@@ -60,23 +58,20 @@ class StateReader {
   requires std::is_trivially_copyable_v<T>
   void values(std::vector<T>& v) {
     const auto count = value<std::uint64_t>();
-    const char* from = take(count, sizeof(T));
+    if (count > m_left / sizeof(T)) fail();
     v.resize(static_cast<std::size_t>(count));
-    if (count > 0) std::memcpy(static_cast<void*>(v.data()), from, v.size() * sizeof(T));
+    get(v.data(), count, sizeof(T));
   }
-  std::string text() {
-    const auto count = value<std::uint64_t>();
-    const char* from = take(count, 1);
-    return {from, static_cast<std::size_t>(count)};
-  }
-  bool atEnd() const { return m_at == m_bytes.size(); }
+  std::string text();
+  bool atEnd() const { return m_left == 0; }
   [[noreturn]] void fail() const;
 
  private:
-  const char* take(std::uint64_t count, std::size_t size);
+  void get(void* to, std::uint64_t count, std::size_t size);
 
-  std::string m_file, m_bytes;
-  std::size_t m_at = 0;
+  std::filesystem::path m_file;
+  std::ifstream m_in;
+  std::uint64_t m_left;
 };
 
 /// Says all that is done of some work.

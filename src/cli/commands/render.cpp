@@ -94,8 +94,10 @@ int renderFrames(const scene::SceneFile& scene, Options& options) {
       if (smoke && !std::exchange(planned, true)) printPlan(scene, frame, request, false);
       return printDryRun(frame, path, cacheFrame, smoke);
     }
-    if (job.hadFinished(frame) && image::exrIsComplete(path))
+    if (job.hadFinished(frame) && image::exrIsComplete(path)) {
+      stats.keep(frame);
       return printLine("frame {}: {} was finished before the interruption", frame, path);
+    }
     request.checkpoint = &job.begin(frame);
     renderOne(smoke ? scene : empty, frame, options, request, stats);
     job.finished(frame);

@@ -70,8 +70,10 @@ int traceFrames(const scene::SceneFile& scene, const Options& options) {
       if (!std::exchange(planned, true)) printPlan(scene, frame, request, true);
       return printDryRun(frame, path, cacheFrame, true);
     }
-    if (job.hadFinished(frame) && vdbIsComplete(path))
+    if (job.hadFinished(frame) && vdbIsComplete(path)) {
+      stats.keep(frame);
       return printLine("frame {}: {} was finished before the interruption", frame, path);
+    }
     request.checkpoint = &job.begin(frame);
     traceOne(scene, frame, options, request, stats);
     job.finished(frame);
