@@ -108,9 +108,12 @@ class FrameLoop {
     StateReader* begun = m_film ? &*m_film : nullptr;
     render::FrameLayers layers = m_renderer->render(light.source.get(), m_pass, begun, filmPause());
     m_film.reset();
+    std::optional<render::FrameLayers> throughWider;
+    if (light.wider) throughWider = m_renderer->render(light.wider.get(), m_pass);
+    // From here on nothing interrupts: what is kept has all of a pass or nothing.
     if (!once()) m_mean.add(layers);
-    if (light.wider)
-      m_error.add(layers.beauty, m_renderer->render(light.wider.get(), m_pass).beauty, kWidening);
+    if (throughWider)
+      m_error.add(layers.beauty, throughWider->beauty, kWidening);
     else if (judged)
       m_error.add(layers.beauty);
     if (once()) m_result.layers = std::move(layers);
