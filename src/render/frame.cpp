@@ -17,7 +17,7 @@ namespace photosphere::render {
 namespace {
 
 constexpr int kBandRows = 16;
-constexpr double kBandSeconds = 2.0;  // where a frame may pause
+constexpr double kBandSeconds = 0.5;  // where a frame may pause
 constexpr int kChunk = 16;            // pixels of a row that one task traces
 constexpr int kSamplesAtOnce = 16;    // bounds the samples kept, whatever render.samples is
 
