@@ -14,7 +14,7 @@ namespace photosphere {
 
 namespace {
 
-constexpr std::int64_t kMaxFrames = 10'000'000;
+constexpr std::int64_t kMaxFrames = 1'000'000;  // eleven hours at 24 a second
 
 [[noreturn]] void badRange(std::string_view text, std::string_view part) {
   throw ConfigError(fmt::format(
@@ -71,6 +71,7 @@ Token findToken(std::string_view path) {
 std::vector<std::int64_t> parseFrames(std::string_view text) {
   std::vector<std::int64_t> frames;
   std::set<std::int64_t> seen;
+  std::int64_t total = 0;
   std::string compact;
   for (const char c : text)
     if (c != ' ' && c != '\t') compact += c;
@@ -96,7 +97,8 @@ std::vector<std::int64_t> parseFrames(std::string_view text) {
       }
     }
     const std::int64_t count = std::abs(last - first) + 1;
-    if (count > kMaxFrames)
+    total += count;
+    if (total > kMaxFrames)
       throw ConfigError(fmt::format("frame range '{}': more than {} frames", text, kMaxFrames));
     const std::int64_t direction = last < first ? -1 : 1;
     for (std::int64_t i = 0; i < count; ++i) {

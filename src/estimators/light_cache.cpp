@@ -64,6 +64,11 @@ class Reader {
     if (!(v >= low && v <= high) || v != std::floor(v)) bad(key);
     return static_cast<int>(v);
   }
+  std::uint64_t count(const std::string& key) const {
+    const double v = number(key);
+    if (!(v >= 0 && v <= 0x1p63)) bad(key);
+    return static_cast<std::uint64_t>(v);
+  }
   template <class E>
   E choice(const std::string& key) const {
     if (const std::optional<E> value = named<E>(text(key))) return *value;
@@ -255,8 +260,8 @@ LightField readLightCache(const std::filesystem::path& path, const LightCacheKey
   l.radius = m.number("radius_m");
   l.depositRadius = m.number("deposit_radius_m");
   if (!(l.lightVoxel > 0)) m.bad("light_voxel");
-  field.photons = static_cast<std::uint64_t>(m.number("photons"));
-  field.farPhotons = static_cast<std::uint64_t>(m.number("far_photons"));
+  field.photons = m.count("photons");
+  field.farPhotons = m.count("far_photons");
 
   // Where each point belongs in the traced numbering.
   const std::size_t count = points.size();
@@ -276,18 +281,25 @@ LightField readLightCache(const std::filesystem::path& path, const LightCacheKey
   const auto size = static_cast<std::size_t>(l.setSize());
   const auto light = static_cast<std::size_t>(l.bins() * l.channels);
   const auto stride = static_cast<std::size_t>(l.valuesPerCarrier());
-  field.values.resize(count * stride);
+  // All are there before room is made for them.
+  struct Column {
+    const std::vector<float>* from;
+    std::size_t width, offset;
+  };
+  std::vector<Column> columns;
   const auto place = [&](const std::string& name, std::size_t width, std::size_t offset) {
-    const auto& from = floats(points, name, count * width, path.string());
-    for (std::size_t i = 0; i < count; ++i)
-      std::copy_n(from.data() + i * width, width,
-                  field.values.data() + static_cast<std::size_t>((*order)[i]) * stride + offset);
+    columns.push_back({&floats(points, name, count * width, path.string()), width, offset});
   };
   for (std::size_t set = 0; set < (l.unscattered ? 2u : 1u); ++set) {
     const std::string suffix = set ? "_unscattered" : "";
     place(valuesName(l) + suffix, light, set * size);
     if (l.keepsMeans()) place("photon_direction" + suffix, size - light, set * size + light);
   }
+  field.values.resize(count * stride);
+  for (const Column& c : columns)
+    for (std::size_t i = 0; i < count; ++i)
+      std::copy_n(c.from->data() + i * c.width, c.width,
+                  field.values.data() + static_cast<std::size_t>((*order)[i]) * stride + c.offset);
   if (l.carrier == Carrier::particles) {
     const auto& local = floats(points, "light_local", count * 3, path.string());
     field.particles.resize(count);
@@ -304,6 +316,9 @@ LightField readLightCache(const std::filesystem::path& path, const LightCacheKey
   for (const double b : bricks)
     if (!(b >= 1 && b <= 1e6)) m.bad("lattice_bricks");
   if (!(edge > 0)) m.bad("lattice_edge_m");
+  // Their table takes memory for each. Smoke so thin in so large a box is none.
+  if (bricks[0] * bricks[1] * bricks[2] > 1e6 + 4096.0 * static_cast<double>(count))
+    m.bad("lattice_bricks");
   const Vec3i brickCount(static_cast<int>(bricks[0]), static_cast<int>(bricks[1]),
                          static_cast<int>(bricks[2]));
   const Vec3d latticeOrigin(origin[0], origin[1], origin[2]);
