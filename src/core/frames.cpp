@@ -6,7 +6,7 @@
 #include <charconv>
 #include <cstdlib>
 #include <filesystem>
-#include <set>
+#include <numeric>
 
 #include "photosphere/core/error.h"
 
@@ -66,11 +66,25 @@ Token findToken(std::string_view path) {
   return found;
 }
 
+// Keeps the first of equal frames, and the order.
+void dropRepeats(std::vector<std::int64_t>& frames) {
+  std::vector<std::size_t> order(frames.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return frames[a] < frames[b]; });
+  std::vector<bool> repeated(frames.size());
+  for (std::size_t i = 1; i < order.size(); ++i)
+    repeated[order[i]] = frames[order[i]] == frames[order[i - 1]];
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < frames.size(); ++i)
+    if (!repeated[i]) frames[kept++] = frames[i];
+  frames.resize(kept);
+}
+
 }  // namespace
 
 std::vector<std::int64_t> parseFrames(std::string_view text) {
   std::vector<std::int64_t> frames;
-  std::set<std::int64_t> seen;
   std::int64_t total = 0;
   std::string compact;
   for (const char c : text)
@@ -103,12 +117,12 @@ std::vector<std::int64_t> parseFrames(std::string_view text) {
     const std::int64_t direction = last < first ? -1 : 1;
     for (std::int64_t i = 0; i < count; ++i) {
       if ((i % step == 0) == complement) continue;
-      const std::int64_t frame = first + i * direction;
-      if (seen.insert(frame).second) frames.push_back(frame);
+      frames.push_back(first + i * direction);
     }
     if (comma == std::string_view::npos) break;
     all.remove_prefix(comma + 1);
   }
+  if (compact.find(',') != std::string::npos) dropRepeats(frames);
   return frames;
 }
 

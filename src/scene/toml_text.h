@@ -4,7 +4,24 @@
 
 #define TOML_EXCEPTIONS 1
 #define TOML_HEADER_ONLY 1
+#include <stdexcept>
+
+namespace photosphere::scene {
+
+/// What the parser takes for impossible, and meets in text such as `[[[`.
+struct TomlAssertion : std::logic_error {
+  using std::logic_error::logic_error;
+};
+
+}  // namespace photosphere::scene
+
+// In a release it would assume that it holds, else abort.
+#define TOML_ASSERT(expr) \
+  ((expr) ? static_cast<void>(0) : throw ::photosphere::scene::TomlAssertion(#expr))
+#pragma push_macro("NDEBUG")
+#undef NDEBUG
 #include <toml++/toml.h>
+#pragma pop_macro("NDEBUG")
 
 #include <map>
 #include <string>

@@ -11,6 +11,7 @@
 #include <cerrno>
 #include <chrono>
 #include <cstring>
+#include <fstream>
 #include <system_error>
 #include <thread>
 
@@ -39,14 +40,19 @@ void setLimit(decltype(RLIMIT_AS) resource, rlim_t value) {
   setrlimit(resource, &limit);
 }
 
+std::uint64_t reservedAddresses() {
+  std::uint64_t pages = 0;
+  std::ifstream("/proc/self/statm") >> pages;
+  return pages * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
+}
+
 // The child's part. Leaves by _exit: the parent's static objects are not its own.
 [[noreturn]] void readInChild(const std::filesystem::path& path, const Limits& limits, int pipe) {
   dup2(pipe, STDERR_FILENO);
   const int nothing = open("/dev/null", O_WRONLY);
   if (nothing >= 0) dup2(nothing, STDOUT_FILENO);
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-  setLimit(RLIMIT_AS, limits.memory);  // sanitizers reserve terabytes of addresses
-#endif
+  // A sanitizer has reserved terabytes of addresses by now: under any limit nothing would work.
+  if (reservedAddresses() < limits.memory) setLimit(RLIMIT_AS, limits.memory);
   setLimit(RLIMIT_CPU, limits.cpuSeconds);
   setLimit(RLIMIT_CORE, 0);
   int code = 0;

@@ -88,7 +88,7 @@ class Faults : public ::testing::Test {
   TemporaryFolder m_folder;
 };
 
-struct Case {
+struct FaultCase {
   const char* name;
   const char* command;
   int exitCode;
@@ -96,22 +96,22 @@ struct Case {
   std::set<std::string> delivered = {};
 };
 
-void PrintTo(const Case& c, std::ostream* out) {
+void PrintTo(const FaultCase& c, std::ostream* out) {
   *out << c.name;
 }
 
-class Table : public Faults, public ::testing::WithParamInterface<Case> {};
+class FaultTable : public Faults, public ::testing::WithParamInterface<FaultCase> {};
 
-TEST_P(Table, NameFileAndRemedyAndLeaveNothing) {
-  const Case& c = GetParam();
+TEST_P(FaultTable, NameFileAndRemedyAndLeaveNothing) {
+  const FaultCase& c = GetParam();
   expectFailure(c.command, c.exitCode, c.words, c.delivered);
 }
 
-std::string nameOf(const ::testing::TestParamInfo<Case>& info) {
+std::string nameOf(const ::testing::TestParamInfo<FaultCase>& info) {
   return info.param.name;
 }
 
-const Case kFullDisk[] = {
+const FaultCase kFullDisk[] = {
     {"Trace",
      "$P trace scene.toml -o full.vdb --frames 1",
      6,
@@ -143,10 +143,10 @@ const Case kFullDisk[] = {
      {"standard output"},
      {"x.exr"}},
 };
-INSTANTIATE_TEST_SUITE_P(FullDisk, Table, ::testing::ValuesIn(kFullDisk), nameOf);
+INSTANTIATE_TEST_SUITE_P(FullDisk, FaultTable, ::testing::ValuesIn(kFullDisk), nameOf);
 
 // 4096 bytes a file: enough for what is printed, too little for each output.
-const Case kFileSizeLimit[] = {
+const FaultCase kFileSizeLimit[] = {
     {"Render",
      "ulimit -f 8; $P render scene.toml -o x.exr --frames 1",
      6,
@@ -176,9 +176,9 @@ const Case kFileSizeLimit[] = {
      6,
      {"x.exr: cannot be written", "ulimit -f"}},
 };
-INSTANTIATE_TEST_SUITE_P(FileSizeLimit, Table, ::testing::ValuesIn(kFileSizeLimit), nameOf);
+INSTANTIATE_TEST_SUITE_P(FileSizeLimit, FaultTable, ::testing::ValuesIn(kFileSizeLimit), nameOf);
 
-const Case kFolderAsTarget[] = {
+const FaultCase kFolderAsTarget[] = {
     {"Trace",
      "$P trace scene.toml -o folder.vdb --frames 1",
      6,
@@ -200,9 +200,9 @@ const Case kFolderAsTarget[] = {
     {"FolderToInspect", "$P inspect folder.vdb", 3, {"folder.vdb"}},
     {"FolderAsScene", "$P render study -o x.exr", 3, {"study"}},
 };
-INSTANTIATE_TEST_SUITE_P(FolderAsTarget, Table, ::testing::ValuesIn(kFolderAsTarget), nameOf);
+INSTANTIATE_TEST_SUITE_P(FolderAsTarget, FaultTable, ::testing::ValuesIn(kFolderAsTarget), nameOf);
 
-const Case kMemory[] = {
+const FaultCase kMemory[] = {
     {"Trace",
      "$P trace scene.toml -o x.vdb --frames 1 -s render.memory_limit=1e-6",
      5,
@@ -229,10 +229,10 @@ const Case kMemory[] = {
      5,
      {"--particles", "fewer than"}},
 };
-INSTANTIATE_TEST_SUITE_P(Memory, Table, ::testing::ValuesIn(kMemory), nameOf);
+INSTANTIATE_TEST_SUITE_P(Memory, FaultTable, ::testing::ValuesIn(kMemory), nameOf);
 
 // Before hours of work, not after: these scenes would take them.
-const Case kColour[] = {
+const FaultCase kColour[] = {
     {"MissingOption",
      "timeout 20 $P render scene.toml -o x.exr --frames 1 --res 4096x4096 "
      "-s render.samples=10000 --ocio none.ocio",
@@ -259,7 +259,7 @@ const Case kColour[] = {
      2,
      {"x.gif", ".png"}},
 };
-INSTANTIATE_TEST_SUITE_P(Colour, Table, ::testing::ValuesIn(kColour), nameOf);
+INSTANTIATE_TEST_SUITE_P(Colour, FaultTable, ::testing::ValuesIn(kColour), nameOf);
 
 /// A folder that nobody but root may write in, and for root a way to be somebody else.
 TEST_F(Faults, LockedFolder) {

@@ -6,6 +6,8 @@
 #include <zlib.h>
 
 #include <algorithm>
+#include <cstdio>
+#include <set>
 #include <stdexcept>
 
 #include "exr_scan.h"
@@ -72,10 +74,22 @@ void readByFormat(const caches::CacheFormat& format, const fs::path& path, std::
   checkContent(format.read(path, ParamValues(format.params)), bytes);
 }
 
+/// What a sanitizer said in the process that looked: no finding, as it was held there, but to be
+/// known. Each once.
+void tellContained(const std::string& reason) {
+  static std::set<std::string> told;
+  const std::size_t begin = reason.find("SUMMARY: ");
+  if (begin == std::string::npos) return;
+  const std::string line = reason.substr(begin, reason.find('\n', begin) - begin);
+  if (told.insert(line).second) fmt::print(stderr, "contained: {}\n", line);
+}
+
 /// A file that OpenVDB reads, once a process of its own has read it.
 void throwUnlessProbed(const fs::path& path) {
   std::string reason;
-  if (!volume::probeVdb(path, reason)) throw InputError(path.string(), reason);
+  if (volume::probeVdb(path, reason)) return;
+  tellContained(reason);
+  throw InputError(path.string(), reason);
 }
 
 void readScene(const std::string& text, const std::vector<std::string>& sets,

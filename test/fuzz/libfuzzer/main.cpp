@@ -3,6 +3,9 @@
 //   --seeds=FOLDER     writes the sound specimens of the target and its words as FOLDER.words
 
 #include <fmt/format.h>
+#include <pthread.h>
+#include <sanitizer/common_interface_defs.h>
+#include <signal.h>
 #include <unistd.h>
 
 #include <cstdio>
@@ -56,6 +59,13 @@ fs::path workFolder() {
   return name;
 }
 
+/// A crash of a process that looks at a file for us is an answer and no finding.
+void leaveCrashesToParent() {
+  __sanitizer_set_death_callback(nullptr);
+  for (const int signal : {SIGSEGV, SIGABRT, SIGBUS, SIGFPE, SIGILL, SIGXFSZ})
+    ::signal(signal, SIG_DFL);
+}
+
 void removeFolder() {
   std::error_code ignored;
   fs::remove_all(g_folder, ignored);
@@ -84,6 +94,7 @@ extern "C" int LLVMFuzzerInitialize(int* argc, char*** argv) {
   }
   g_folder = workFolder();
   std::atexit(removeFolder);
+  pthread_atfork(nullptr, nullptr, leaveCrashesToParent);
   return 0;
 }
 
