@@ -6,7 +6,7 @@
 #include <charconv>
 #include <cstdlib>
 #include <filesystem>
-#include <numeric>
+#include <unordered_set>
 
 #include "photosphere/core/error.h"
 
@@ -68,17 +68,9 @@ Token findToken(std::string_view path) {
 
 // Keeps the first of equal frames, and the order.
 void dropRepeats(std::vector<std::int64_t>& frames) {
-  std::vector<std::size_t> order(frames.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::size_t a, std::size_t b) { return frames[a] < frames[b]; });
-  std::vector<bool> repeated(frames.size());
-  for (std::size_t i = 1; i < order.size(); ++i)
-    repeated[order[i]] = frames[order[i]] == frames[order[i - 1]];
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < frames.size(); ++i)
-    if (!repeated[i]) frames[kept++] = frames[i];
-  frames.resize(kept);
+  std::unordered_set<std::int64_t> seen;
+  seen.reserve(frames.size());
+  std::erase_if(frames, [&](std::int64_t frame) { return !seen.insert(frame).second; });
 }
 
 }  // namespace

@@ -141,7 +141,38 @@ toml::node& descend(toml::node& at, const std::string& segment, const std::strin
   throw ConfigError(fmt::format("--set {}: nothing lies below a plain value ('{}')", set, segment));
 }
 
+// Whether the text is UTF-8, as TOML is: no byte out of place, nothing written longer than it must
+// be (RFC 3629).
+bool isUtf8(std::string_view text) {
+  for (std::size_t i = 0; i < text.size();) {
+    const auto byte = [&](std::size_t k) {
+      return i + k < text.size() ? static_cast<unsigned char>(text[i + k]) : 0u;
+    };
+    const unsigned first = byte(0);
+    if (first < 0x80) {
+      ++i;
+      continue;
+    }
+    const std::size_t more = first >= 0xF0 ? 3 : first >= 0xE0 ? 2 : 1;
+    if (first < 0xC2 || first > 0xF4) return false;
+    std::uint32_t code = first & (0x3Fu >> more);
+    for (std::size_t k = 1; k <= more; ++k) {
+      if ((byte(k) & 0xC0u) != 0x80u) return false;
+      code = code << 6 | (byte(k) & 0x3Fu);
+    }
+    const std::uint32_t least = more == 1 ? 0x80 : more == 2 ? 0x800 : 0x10000;
+    if (code < least || code > 0x10FFFF || (code >= 0xD800 && code <= 0xDFFF)) return false;
+    i += more + 1;
+  }
+  return true;
+}
+
 void applySet(toml::table& root, const std::string& set, TomlText& out) {
+  if (!isUtf8(set))
+    throw ConfigError(
+        fmt::format("--set {}: is not UTF-8, as a scene is; rename the file or set "
+                    "the terminal's encoding",
+                    set));
   const std::size_t equals = set.find('=');
   const std::string path = set.substr(0, equals);
   if (equals == std::string::npos || path.empty())

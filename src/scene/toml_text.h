@@ -13,11 +13,15 @@ struct TomlAssertion : std::logic_error {
   using std::logic_error::logic_error;
 };
 
+[[noreturn]] inline void throwTomlAssertion(const char* what) {
+  throw TomlAssertion(what);
+}
+
 }  // namespace photosphere::scene
 
 // In a release it would assume that it holds, else abort.
 #define TOML_ASSERT(expr) \
-  ((expr) ? static_cast<void>(0) : throw ::photosphere::scene::TomlAssertion(#expr))
+  ((expr) ? static_cast<void>(0) : ::photosphere::scene::throwTomlAssertion(#expr))
 #pragma push_macro("NDEBUG")
 #undef NDEBUG
 #include <toml++/toml.h>

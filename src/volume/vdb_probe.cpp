@@ -11,10 +11,10 @@
 #include <cerrno>
 #include <chrono>
 #include <cstring>
-#include <fstream>
 #include <system_error>
 #include <thread>
 
+#include "address_room.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/parallel.h"
 #include "photosphere/volume/vdb_file.h"
@@ -38,12 +38,6 @@ void setLimit(decltype(RLIMIT_AS) resource, rlim_t value) {
   getrlimit(resource, &limit);
   limit.rlim_cur = std::min(value, limit.rlim_max);
   setrlimit(resource, &limit);
-}
-
-std::uint64_t reservedAddresses() {
-  std::uint64_t pages = 0;
-  std::ifstream("/proc/self/statm") >> pages;
-  return pages * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
 }
 
 // The child's part. Leaves by _exit: the parent's static objects are not its own.

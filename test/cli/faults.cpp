@@ -63,11 +63,14 @@ class Faults : public ::testing::Test {
 
   RunResult shell(const std::string& command) { return runShell(command, m_folder.path()); }
 
-  /// Names of all files below the folder; of links too, and not of folders.
+  /// Names of all files below the folder, of links too; not of folders, and not of references,
+  /// which a study keeps for the next.
   std::set<std::string> files() const {
     std::set<std::string> names;
     for (const auto& entry : fs::recursive_directory_iterator(m_folder.path()))
-      if (!entry.is_directory()) names.insert(fs::relative(entry.path(), m_folder.path()).string());
+      if (!entry.is_directory())
+        names.insert(entry.path().lexically_relative(m_folder.path()).string());
+    std::erase_if(names, [](const std::string& name) { return name.starts_with("cache/"); });
     return names;
   }
 
@@ -252,7 +255,7 @@ const FaultCase kColour[] = {
      "timeout 20 $P render scene.toml -o x.exr --frames 1 --res 4096x4096 "
      "-s render.samples=10000 --preview x.png --ocio-view sideways",
      2,
-     {"sideways", "known"}},
+     {"sideways", "choose one of"}},
     {"KindOfPreview",
      "timeout 20 $P render scene.toml -o x.exr --frames 1 --res 4096x4096 "
      "-s render.samples=10000 --preview x.gif",

@@ -6,6 +6,7 @@
 
 #include "photosphere/caches/cache_format.h"
 #include "photosphere/core/error.h"
+#include "photosphere/core/log.h"
 #include "photosphere/estimators/light_cache.h"
 #include "photosphere/image/exr.h"
 #include "photosphere/volume/vdb_file.h"
@@ -66,8 +67,10 @@ void addWritten(std::vector<Specimen>& all) {
     if (!format->write || !format->read) continue;
     for (const std::string_view extension : format->extensions) {
       const bool first = extension == format->extensions.front();
+      std::string file = "a";
+      file += extension;
       const std::string target(first ? format->name : extension.substr(1));
-      all.push_back({target, "written", written(*format, "a" + std::string(extension))});
+      all.push_back({target, "written", written(*format, file)});
     }
     if (format->name == "ply")
       for (const char* encoding : {"ascii", "binary_big_endian"})
@@ -144,7 +147,7 @@ void addHandMade(std::vector<Specimen>& all) {
     all.push_back({"uni.unpacked", names[i], grids[i]});
   }
   all.push_back({"prt.unpacked", "positions", unpackedPrt()});
-  all.push_back({"detect", "table", "x,y,z\n1,2,3\n"});
+  all.push_back({"detect", "ply", "ply\nformat ascii 1.0\n"});
 }
 
 std::string lightCache(estimators::Carrier carrier) {
@@ -242,7 +245,7 @@ aovs = ["beauty", 'single']
     all.push_back({"scene", entry.path().stem().string(), test::readText(entry.path())});
   all.push_back({"overrides", "several",
                  "volume.0.density_scale=4\nlight.1.type=point\ncamera.look_at=[1, 2, 3]\n"
-                 "render.samples = 2\nvolume.0.file=other.vdb\n"});
+                 "render.samples=2\nvolume.0.file=other.vdb\n"});
   all.push_back({"frames", "range", "3,4,10-20x2,5-1,-10--5,1-5y2"});
   all.push_back({"chan", "shot",
                  "# frame, translation, rotation, field of view\n1 0 0 5 0 0 0 40\n"
@@ -252,12 +255,15 @@ aovs = ["beauty", 'single']
 }  // namespace
 
 std::vector<Specimen> specimens() {
+  const log::Level level = log::level();
+  log::setLevel(log::Level::off);  // of what a format cannot hold
   std::vector<Specimen> all;
   addWritten(all);
   addHandMade(all);
   addVolumes(all);
   addPictures(all);
   addTexts(all);
+  log::setLevel(level);
   return all;
 }
 

@@ -15,10 +15,12 @@ struct Target {
   /// Reads the bytes, by way of a file in `folder` where the reader takes a path. Returns where
   /// they are read, throws photosphere::Error where they are refused; anything else is a finding.
   std::function<void(const std::string& bytes, const std::filesystem::path& folder)> read;
-  /// Read by a library that damage can bring down: in a process of its own, or after a look by one.
+  /// A .vdb, read by a library that damage can bring down: for processes of their own.
   bool isolated = false;
   /// Words of the format, which chance would be long to find.
-  std::vector<std::string> words;
+  std::vector<std::string> words = {};
+  /// Memory in one piece that is taken for the smallest input [bytes]: blocks of files.
+  std::size_t room = std::size_t{16} << 20;
 };
 
 const std::vector<Target>& targets();

@@ -1,9 +1,12 @@
 #include "trial.h"
 
 #include <fcntl.h>
+#include <sys/mman.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
+
+#include <new>
 
 #include "allocation_limit.h"
 #include "photosphere/core/error.h"
@@ -13,81 +16,125 @@ namespace photosphere::fuzz {
 
 namespace {
 
-/// Deflate makes up to 1032 bytes of one, and a reader may hold them twice; blocks of files are
-/// read by the megabyte.
-std::size_t justified(std::size_t bytes) {
-  return (std::size_t{16} << 20) + 2100 * bytes;
-}
+namespace fs = std::filesystem;
+
+/// One process is asked so often before the next begins: memory that one input damaged must not be
+/// there for all.
+constexpr std::size_t kBatch = 100;
 
 bool ofTheInput(ExitCode code) {
   return code == ExitCode::usage || code == ExitCode::inputMissing ||
          code == ExitCode::inputInvalid || code == ExitCode::memory;
 }
 
-/// 0 read, 10 refused, 11 anything else, which `complaint` then tells.
-int run(const Target& target, const std::string& bytes, const std::filesystem::path& folder,
-        std::string& complaint) {
+/// @return what is wrong with how the input ended, or nothing
+std::string give(const Target& target, const std::string& bytes, const fs::path& folder,
+                 Outcomes& outcomes) {
   try {
     target.read(bytes, folder);
-    return 0;
+    ++outcomes.read;
   } catch (const Error& error) {
-    if (ofTheInput(error.code()) && error.what()[0] != '\0') return 10;
-    complaint = std::string("an error of another kind: ") + error.what();
+    if (!ofTheInput(error.code()) || error.what()[0] == '\0')
+      return std::string("an error of another kind: ") + error.what();
+    ++outcomes.refused;
   } catch (const std::exception& error) {
-    complaint = std::string("no Error: ") + error.what();
+    return std::string("no Error: ") + error.what();
   }
-  return 11;
+  return {};
 }
 
+void giveHere(const Target& target, const std::string& bytes, const std::string& what,
+              const fs::path& folder, Outcomes& outcomes) {
+  // Deflate makes up to 1032 bytes of one, and a reader may hold them twice.
+  const AllocationLimit limit(target.room + 2100 * bytes.size());
+  const std::string complaint = give(target, bytes, folder, outcomes);
+  const std::size_t refused = limit.refused();
+  if (refused > 0)
+    ADD_FAILURE() << what << ": asked for " << refused << " bytes of memory for an input of "
+                  << bytes.size();
+  if (!complaint.empty()) ADD_FAILURE() << what << ": " << complaint;
+}
+
+/// What a process of its own leaves behind when it ends early.
+struct Shared {
+  std::size_t next = 0;  ///< input that it is at
+  Outcomes outcomes;
+};
+
 void limitMemoryAndTime() {
-  const struct rlimit memory { rlim_t(2) << 30, rlim_t(2) << 30 }, cpu{10, 12}, core{0, 0};
+  const struct rlimit memory { rlim_t(2) << 30, rlim_t(2) << 30 }, cpu{60, 62}, core{0, 0};
   if (!test::kSanitized) setrlimit(RLIMIT_AS, &memory);  // a sanitizer reserves terabytes
   setrlimit(RLIMIT_CPU, &cpu);
   setrlimit(RLIMIT_CORE, &core);
 }
 
-Outcome attemptInChild(const Target& target, const std::string& bytes, const std::string& what,
-                       const test::TemporaryFolder& folder) {
-  const std::filesystem::path report = folder / "report";
+/// Gives inputs from `shared.next` to `end` in a process of its own. @return how that ended
+int giveInChild(const Target& target, std::size_t end,
+                const std::function<std::string(std::size_t)>& input, const fs::path& folder,
+                Shared& shared) {
+  const fs::path report = folder / "report";
   const pid_t child = fork();
-  if (child < 0) {
-    ADD_FAILURE() << "fork failed";
-    return Outcome::failed;
-  }
+  if (child < 0) return -1;
   if (child == 0) {
     limitMemoryAndTime();
     dup2(open(report.c_str(), O_CREAT | O_TRUNC | O_WRONLY, 0600), STDERR_FILENO);
-    std::string complaint;
-    const int code = run(target, bytes, folder.path(), complaint);
-    const ssize_t ignored = write(STDERR_FILENO, complaint.data(), complaint.size());
-    static_cast<void>(ignored);
-    _exit(code);
+    for (; shared.next < end; ++shared.next) {
+      const std::string complaint = give(target, input(shared.next), folder, shared.outcomes);
+      if (complaint.empty()) continue;
+      const ssize_t ignored = write(STDERR_FILENO, complaint.data(), complaint.size());
+      static_cast<void>(ignored);
+      _exit(11);
+    }
+    _exit(0);
   }
   int status = 0;
   waitpid(child, &status, 0);
-  const int code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-  if (code == 0) return Outcome::read;
-  if (code == 10) return Outcome::refused;
-  if (code == static_cast<int>(ExitCode::inputInvalid)) return Outcome::guarded;
-  ADD_FAILURE() << what << ": ended with " << code << '\n' << test::readText(report);
-  return Outcome::failed;
+  return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+}
+
+Outcomes giveInChildren(const Target& target, std::size_t count,
+                        const std::function<std::string(std::size_t)>& input,
+                        const std::function<std::string(std::size_t)>& what,
+                        const fs::path& folder) {
+  void* memory =
+      mmap(nullptr, sizeof(Shared), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  if (memory == MAP_FAILED) {
+    ADD_FAILURE() << "no memory to share";
+    return {};
+  }
+  Shared& shared = *new (memory) Shared;
+  while (shared.next < count) {
+    const int code =
+        giveInChild(target, std::min(count, shared.next + kBatch), input, folder, shared);
+    if (code == 0) continue;
+    if (code == static_cast<int>(ExitCode::inputInvalid))
+      ++shared.outcomes.guarded;
+    else
+      ADD_FAILURE() << what(shared.next) << ": ended with " << code << '\n'
+                    << test::readText(folder / "report");
+    ++shared.next;
+  }
+  const Outcomes outcomes = shared.outcomes;
+  munmap(memory, sizeof(Shared));
+  return outcomes;
 }
 
 }  // namespace
 
-Outcome attempt(const Target& target, const std::string& bytes, const std::string& what,
-                const test::TemporaryFolder& folder) {
+Outcomes attempt(const Target& target, std::size_t count,
+                 const std::function<std::string(std::size_t)>& input,
+                 const std::function<std::string(std::size_t)>& what) {
+  const test::TemporaryFolder folder;
+  const log::Level level = log::level();
   log::setLevel(log::Level::off);
-  if (target.isolated) return attemptInChild(target, bytes, what, folder);
-  std::string complaint;
-  const AllocationLimit limit(justified(bytes.size()));
-  const int code = run(target, bytes, folder.path(), complaint);
-  const std::size_t refused = limit.refused();
-  if (refused > 0)
-    ADD_FAILURE() << what << ": asked for " << refused << " bytes of memory for an input of "
-                  << bytes.size();
-  if (code == 11) ADD_FAILURE() << what << ": " << complaint;
-  return code == 0 ? Outcome::read : code == 10 ? Outcome::refused : Outcome::failed;
+  Outcomes outcomes;
+  if (target.isolated)
+    outcomes = giveInChildren(target, count, input, what, folder.path());
+  else
+    for (std::size_t i = 0; i < count; ++i)
+      giveHere(target, input(i), what(i), folder.path(), outcomes);
+  log::setLevel(level);
+  return outcomes;
 }
 
 }  // namespace photosphere::fuzz
