@@ -16,13 +16,16 @@ void PrintTo(const Specimen& specimen, std::ostream* out) {
 
 namespace {
 
-/// Scenes that are shipped are whole; one scene stands for all where each byte is damaged.
+/// Where each byte is damaged one scene stands for those that are shipped, and one .vdb of a kind
+/// for the others: OpenVDB takes long for what it crashes over.
 std::vector<Specimen> damagedOnes() {
-  std::vector<Specimen> chosen;
-  for (Specimen& specimen : specimens())
-    if (specimen.target != "scene" || specimen.name == "keyed")
-      chosen.push_back(std::move(specimen));
-  return chosen;
+  const std::set<std::string> chosen{"scene keyed", "vdb smoke_and_points", "light_cache voxels"};
+  const std::set<std::string> choosy{"scene", "vdb", "light_cache"};
+  std::vector<Specimen> all = specimens();
+  std::erase_if(all, [&](const Specimen& specimen) {
+    return choosy.count(specimen.target) && !chosen.count(specimen.target + " " + specimen.name);
+  });
+  return all;
 }
 
 /// Text cut between two numbers or lines is whole text, and every byte of one may be another
@@ -94,7 +97,9 @@ TEST_P(Damage, CutAtEveryByte) {
 }
 
 TEST_P(Damage, FlippedAtEveryByte) {
-  const Outcomes outcomes = damage("flipped", {flip(0x01), flip(0x80), flip(0xFF)});
+  const Outcomes outcomes = target().isolated
+                                ? damage("flipped", {flip(0x80), flip(0xFF)})
+                                : damage("flipped", {flip(0x01), flip(0x80), flip(0xFF)});
   EXPECT_GT(outcomes.refused, 0);
 }
 
