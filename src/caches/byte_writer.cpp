@@ -1,7 +1,6 @@
 #include "byte_writer.h"
 
 #include <cerrno>
-#include <cstring>
 
 #include "photosphere/core/error.h"
 
@@ -14,9 +13,8 @@ ByteWriter::ByteWriter(const std::filesystem::path& path)
 
 void ByteWriter::check(bool good) {
   if (!good)
-    throw OutputError(m_output.target().string(), std::string("cannot be written (") +
-                                                      std::strerror(errno) +
-                                                      "); check space and permissions");
+    throw OutputError(m_output.target().string(),
+                      "cannot be written: " + describeWriteError(errno));
 }
 
 void ByteWriter::write(const void* data, std::size_t size) {

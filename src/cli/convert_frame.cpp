@@ -111,6 +111,17 @@ void addDensity(caches::CacheContent& content, const ConvertOptions& options) {
                               : volume::renamed(result.density, options.density));
 }
 
+/// Position, mass, radius and density, first in lists that grow and then as points of a grid.
+void checkSeedMemory(std::uint64_t particles) {
+  constexpr std::uint64_t kBytesEach = 150;
+  const std::uint64_t free = availableMemoryBytes();
+  if (particles > free / kBytesEach)
+    throw MemoryError(fmt::format(
+        "--particles {}: so many take {} bytes each, and {} of memory are free; ask for "
+        "fewer than {}",
+        particles, kBytesEach, formatBytes(free), free / kBytesEach));
+}
+
 void addParticles(caches::CacheContent& content, const ConvertOptions& options) {
   const Grid* density = findGrid(content, options.density);
   if (!density || options.particles == 0) {
@@ -119,6 +130,7 @@ void addParticles(caches::CacheContent& content, const ConvertOptions& options) 
                    options.density);
     return;
   }
+  checkSeedMemory(options.particles);
   ParticleSet set = volume::seedParticles(*density, options.particles, options.seed);
   double mass = 0;
   if (const volume::Attribute* column = set.find("mass"))

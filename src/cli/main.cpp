@@ -1,6 +1,8 @@
 #include "photosphere/cli/main.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -67,6 +69,13 @@ int report(ExitCode code, const char* why) {
   return static_cast<int>(code);
 }
 
+/// A stream that was closed before the start (`>&-`) leaves its number to the next file that is
+/// opened, and what is printed would go into that. The wrong mode keeps writing to it an error.
+void holdStandardStreams() {
+  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
+    if (fcntl(stream, F_GETFD) < 0) open("/dev/null", stream == STDIN_FILENO ? O_WRONLY : O_RDONLY);
+}
+
 // Every exception of a command ends here and becomes its exit code.
 int guarded(int argc, char** argv) {
   try {
@@ -87,6 +96,7 @@ int guarded(int argc, char** argv) {
 }  // namespace
 
 int run(int argc, char** argv) {
+  holdStandardStreams();
   installSignalHandlers();
   const int code = guarded(argc, argv);
   // A result that nobody received is no result.

@@ -6,7 +6,7 @@
 #include <charconv>
 #include <cstdlib>
 #include <filesystem>
-#include <set>
+#include <unordered_set>
 
 #include "photosphere/core/error.h"
 
@@ -14,7 +14,7 @@ namespace photosphere {
 
 namespace {
 
-constexpr std::int64_t kMaxFrames = 10'000'000;
+constexpr std::int64_t kMaxFrames = 1'000'000;  // eleven hours at 24 a second
 
 [[noreturn]] void badRange(std::string_view text, std::string_view part) {
   throw ConfigError(fmt::format(
@@ -66,11 +66,18 @@ Token findToken(std::string_view path) {
   return found;
 }
 
+// Keeps the first of equal frames, and the order.
+void dropRepeats(std::vector<std::int64_t>& frames) {
+  std::unordered_set<std::int64_t> seen;
+  seen.reserve(frames.size());
+  std::erase_if(frames, [&](std::int64_t frame) { return !seen.insert(frame).second; });
+}
+
 }  // namespace
 
 std::vector<std::int64_t> parseFrames(std::string_view text) {
   std::vector<std::int64_t> frames;
-  std::set<std::int64_t> seen;
+  std::int64_t total = 0;
   std::string compact;
   for (const char c : text)
     if (c != ' ' && c != '\t') compact += c;
@@ -96,17 +103,18 @@ std::vector<std::int64_t> parseFrames(std::string_view text) {
       }
     }
     const std::int64_t count = std::abs(last - first) + 1;
-    if (count > kMaxFrames)
+    total += count;
+    if (total > kMaxFrames)
       throw ConfigError(fmt::format("frame range '{}': more than {} frames", text, kMaxFrames));
     const std::int64_t direction = last < first ? -1 : 1;
     for (std::int64_t i = 0; i < count; ++i) {
       if ((i % step == 0) == complement) continue;
-      const std::int64_t frame = first + i * direction;
-      if (seen.insert(frame).second) frames.push_back(frame);
+      frames.push_back(first + i * direction);
     }
     if (comma == std::string_view::npos) break;
     all.remove_prefix(comma + 1);
   }
+  if (compact.find(',') != std::string::npos) dropRepeats(frames);
   return frames;
 }
 

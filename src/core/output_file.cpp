@@ -38,18 +38,15 @@ int claimSlot(const std::string& path) {
   return -1;
 }
 
-std::string reason(int error) {
-  return std::strerror(error);
-}
-
 void syncPath(const fs::path& path, int flags) {
   const int fd = open(path.c_str(), flags);
-  if (fd < 0) throw OutputError(path.string(), "cannot reopen to flush it: " + reason(errno));
+  if (fd < 0)
+    throw OutputError(path.string(), "cannot reopen to flush it: " + describeWriteError(errno));
   const int failed = fsync(fd) != 0 ? errno : 0;
   close(fd);
   // Some file systems cannot flush a folder; the rename itself is still atomic there.
   if (failed && failed != EINVAL && failed != ENOTSUP)
-    throw OutputError(path.string(), "cannot flush to disk: " + reason(failed));
+    throw OutputError(path.string(), "cannot flush to disk: " + describeWriteError(failed));
 }
 
 }  // namespace
@@ -69,10 +66,10 @@ OutputFile::OutputFile(const fs::path& target) : m_target(target) {
   const fs::path folder = m_target.has_parent_path() ? m_target.parent_path() : fs::path(".");
   fs::create_directories(folder, error);
   if (error && !fs::is_directory(folder))
-    throw OutputError(target.string(),
-                      "cannot create folder " + folder.string() + ": " + error.message());
+    throw OutputError(target.string(), "cannot create folder " + folder.string() + ": " +
+                                           describeWriteError(error.value()));
   if (access(folder.c_str(), W_OK) != 0)
-    throw OutputError(target.string(), "cannot write in its folder: " + reason(errno));
+    throw OutputError(target.string(), "cannot write in its folder: " + describeWriteError(errno));
   // Keeps the extension, by which some libraries choose the format.
   m_temporary = folder / fmt::format(".{}.tmp-photosphere-{}{}", m_target.stem().string(), getpid(),
                                      m_target.extension().string());
@@ -91,7 +88,8 @@ void OutputFile::commit() {
   if (!inPlace()) {
     syncPath(m_temporary, O_RDONLY);
     if (rename(m_temporary.c_str(), m_target.c_str()) != 0)
-      throw OutputError(m_target.string(), "cannot rename into place: " + reason(errno));
+      throw OutputError(m_target.string(),
+                        "cannot rename into place: " + describeWriteError(errno));
     const fs::path folder = m_target.has_parent_path() ? m_target.parent_path() : fs::path(".");
     syncPath(folder, O_RDONLY | O_DIRECTORY);
   }
@@ -102,7 +100,7 @@ void writeFile(const fs::path& target, const std::string& content) {
   OutputFile file(target);
   const int flags = O_WRONLY | O_CREAT | (file.inPlace() ? 0 : O_TRUNC);
   const int fd = open(file.temporaryPath().c_str(), flags, 0666);
-  if (fd < 0) throw OutputError(target.string(), "cannot create: " + reason(errno));
+  if (fd < 0) throw OutputError(target.string(), "cannot create: " + describeWriteError(errno));
   std::size_t written = 0;
   int failed = 0;
   while (written < content.size() && !failed) {
@@ -111,8 +109,25 @@ void writeFile(const fs::path& target, const std::string& content) {
     if (n > 0) written += static_cast<std::size_t>(n);
   }
   if (close(fd) != 0 && !failed) failed = errno;
-  if (failed) throw OutputError(target.string(), "cannot write: " + reason(failed));
+  if (failed) throw OutputError(target.string(), "cannot write: " + describeWriteError(failed));
   file.commit();
+}
+
+std::string describeWriteError(int error) {
+  const std::string what = error ? std::strerror(error) : "the device refused the data";
+  switch (error) {
+    case ENOSPC:
+    case EDQUOT:
+      return what + "; free some, or write elsewhere";
+    case EFBIG:
+      return what + "; raise the limit of file sizes (ulimit -f), or write elsewhere";
+    case EACCES:
+    case EPERM:
+    case EROFS:
+      return what + "; change the permissions, or write elsewhere";
+    default:
+      return what + "; check the disk, or write elsewhere";
+  }
 }
 
 void removeTemporaries() noexcept {

@@ -152,6 +152,9 @@ transport::SupportLattice readLattice(const MetadataReader& m, const volume::Par
     if (!(bricks[a] >= 1 && bricks[a] <= 1e6) || bricks[a] != std::floor(bricks[a]))
       m.bad("lattice_bricks");
   if (!(edge > 0)) m.bad("lattice_edge_m");
+  // Their table takes memory for each. Smoke so thin in so large a box is none.
+  if (bricks.x * bricks.y * bricks.z > 1e6 + 4096.0 * static_cast<double>(points.size()))
+    m.bad("lattice_bricks");
   std::vector<Vec3i> active(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Vec3d v = (space.localFromWorld(points.positions[i]) - origin) / edge - 0.5;

@@ -114,20 +114,25 @@ LightField readLightCache(const std::filesystem::path& path, const LightCacheKey
   const auto size = static_cast<std::size_t>(l.setSize());
   const auto light = static_cast<std::size_t>(l.bins() * l.channels);
   const auto stride = static_cast<std::size_t>(l.valuesPerCarrier());
-  // Before memory is taken for what the file only claims.
-  column<float>(path.string(), points, valuesName(l), count * light);
-  field.values.resize(count * stride);
+  // All are there before room is made for them.
+  struct Column {
+    const std::vector<float>* from;
+    std::size_t width, offset;
+  };
+  std::vector<Column> columns;
   const auto place = [&](const std::string& name, std::size_t width, std::size_t offset) {
-    const auto& from = column<float>(path.string(), points, name, count * width);
-    for (std::size_t i = 0; i < count; ++i)
-      std::copy_n(from.data() + i * width, width,
-                  field.values.data() + static_cast<std::size_t>(order[i]) * stride + offset);
+    columns.push_back({&column<float>(path.string(), points, name, count * width), width, offset});
   };
   for (std::size_t set = 0; set < (l.unscattered ? 2u : 1u); ++set) {
     const std::string suffix = set ? "_unscattered" : "";
     place(valuesName(l) + suffix, light, set * size);
     if (l.keepsMeans()) place("photon_direction" + suffix, size - light, set * size + light);
   }
+  field.values.resize(count * stride);
+  for (const Column& c : columns)
+    for (std::size_t i = 0; i < count; ++i)
+      std::copy_n(c.from->data() + i * c.width, c.width,
+                  field.values.data() + static_cast<std::size_t>(order[i]) * stride + c.offset);
   if (l.carrier == Carrier::particles)
     field.particles = readLocal(path.string(), points, order);
   else

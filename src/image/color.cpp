@@ -161,8 +161,10 @@ ColorConfig ColorConfig::load(const std::string& optionPath) {
     impl->source = path;
     return ColorConfig(std::move(impl));
   } catch (const std::exception& failure) {
-    throw InputError(path, fmt::format("is not a colour config that OpenColorIO {} can use: {}",
-                                       OCIO::GetVersion(), failure.what()));
+    throw InputError(
+        path, fmt::format("is not a colour config that OpenColorIO {} can use: {}; correct it, "
+                          "or leave it out for the shipped config",
+                          OCIO::GetVersion(), failure.what()));
   }
 }
 

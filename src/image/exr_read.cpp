@@ -57,10 +57,25 @@ void checkReadable(const std::string& path, const ExrScan& scan) {
                                   formatBytes(needed), formatBytes(availableMemoryBytes())));
 }
 
+/// Every bound was set by what the scan saw.
+void checkSameHeader(const std::string& path, const ExrPart& part, const Imf::Header& header) {
+  const Imath::Box2i box = header.dataWindow();
+  int channels = 0;
+  bool same = box.min == Imath::V2i(part.data.x, part.data.y) &&
+              box.size() == Imath::V2i(part.data.width - 1, part.data.height - 1) &&
+              static_cast<int>(header.compression()) == static_cast<int>(part.compression) &&
+              header.hasTileDescription() == part.tiled;
+  for (auto at = header.channels().begin(); at != header.channels().end(); ++at)
+    ++channels;
+  same = same && channels == part.channelCount;
+  if (!same) throw InputError(path, "is damaged: its header can be read in two ways");
+}
+
 ExrFile readPixels(const std::string& path, const ExrPart& part) {
   Imf::InputFile file(path.c_str(), 0);
   const Imf::Header& header = file.header();
   const Imath::Box2i box = header.dataWindow();
+  checkSameHeader(path, part, header);
   ExrFile result{Image(part.data, part.display), getAttributes(header)};
   for (auto at = header.channels().begin(); at != header.channels().end(); ++at) {
     const bool isHalf = at.channel().type == Imf::HALF;

@@ -167,18 +167,62 @@ void checkHeader(const ExrBytes& bytes, RawHeader& header, bool multiPart) {
     bytes.damaged("its chunk count does not match its windows");
 }
 
+/// OpenEXR reads as many bytes as a type takes, whatever size is stated, and what is left would be
+/// its next attribute: it would then see another header than this scan.
+void checkSize(ExrBytes& bytes, const std::string& name, std::string_view type, std::int32_t size) {
+  static constexpr std::pair<std::string_view, std::int32_t> sizes[] = {
+      {"box2f", 16},
+      {"box2i", 16},
+      {"chromaticities", 32},
+      {"compression", 1},
+      {"deepImageState", 1},
+      {"double", 8},
+      {"envmap", 1},
+      {"float", 4},
+      {"int", 4},
+      {"keycode", 28},
+      {"lineOrder", 1},
+      {"m33d", 72},
+      {"m33f", 36},
+      {"m44d", 128},
+      {"m44f", 64},
+      {"rational", 8},
+      {"tiledesc", 9},
+      {"timecode", 8},
+      {"v2d", 16},
+      {"v2f", 8},
+      {"v2i", 8},
+      {"v3d", 24},
+      {"v3f", 12},
+      {"v3i", 12},
+  };
+  std::int64_t expected = size;
+  for (const auto& [known, itsSize] : sizes)
+    if (type == known) expected = itsSize;
+  if (type == "preview") {
+    const std::uint64_t begin = bytes.position();
+    const auto width = bytes.value<std::uint32_t>(), height = bytes.value<std::uint32_t>();
+    bytes.seek(begin);
+    if (width > 1u << 14 || height > 1u << 14) bytes.damaged("its preview has an impossible size");
+    expected = 8 + 4 * std::int64_t{width} * std::int64_t{height};
+  }
+  if (size != expected)
+    bytes.damaged(fmt::format("attribute '{}' of type {} has {} bytes", name, type, size));
+}
+
 /// One header up to its end mark. @return false for the empty header that ends a multi-part list
 bool readHeader(ExrBytes& bytes, RawHeader& header) {
   bool any = false;
   for (std::string name = bytes.name(); !name.empty(); name = bytes.name()) {
     any = true;
-    bytes.name();  // type
+    const std::string type = bytes.name();
     const auto size = bytes.value<std::int32_t>();
     if (size < 0 || static_cast<std::uint64_t>(size) > bytes.left()) bytes.cutShort();
     const std::uint64_t end = bytes.position() + static_cast<std::uint64_t>(size);
+    checkSize(bytes, name, type, size);
     readAttribute(bytes, name, size, header);
-    if (bytes.position() > end)
-      bytes.damaged(fmt::format("attribute '{}' overruns its size", name));
+    if (bytes.position() > end || (name == "channels" && bytes.position() != end))
+      bytes.damaged(fmt::format("attribute '{}' does not fill its size", name));
     bytes.seek(end);
   }
   return any;

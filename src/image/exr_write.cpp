@@ -43,8 +43,9 @@ constexpr std::array<CompressionName, 7> kCompressions{{
 /// that swallows exceptions.
 class CheckedStream : public Imf::OStream {
  public:
-  explicit CheckedStream(const std::string& path)
-      : Imf::OStream(path.c_str()), m_file(std::fopen(path.c_str(), "wb")) {
+  /// @param error  becomes errno of the first failure
+  CheckedStream(const std::string& path, int& error)
+      : Imf::OStream(path.c_str()), m_file(std::fopen(path.c_str(), "wb")), m_error(error) {
     if (!m_file) fail();
   }
   ~CheckedStream() override {
@@ -84,7 +85,7 @@ class CheckedStream : public Imf::OStream {
   std::FILE* m_file;
   uint64_t m_position = 0;
   uint64_t m_end = 0;
-  int m_error = 0;
+  int& m_error;
 };
 
 std::string pixelName(const Image& image, const Channel& channel, std::size_t index) {
@@ -205,15 +206,18 @@ void writeExr(const std::filesystem::path& path, const Image& image,
   const bool halfColor = halfFits && !options.floatColor;
   OutputFile output(path);
   uint64_t size = 0;
+  int failure = 0;
   try {
-    CheckedStream stream(output.temporaryPath().string());
+    CheckedStream stream(output.temporaryPath().string(), failure);
     {
       Imf::OutputFile file(stream, makeHeader(image, attributes, options, halfColor), 0);
       writePixels(file, image, halfColor);
     }
     size = stream.close();
   } catch (const std::exception& error) {
-    throw OutputError(name, fmt::format("cannot write this EXR: {}", error.what()));
+    // OpenEXR would name the temporary file and no remedy.
+    throw OutputError(name, "cannot be written: " + (failure ? describeWriteError(failure)
+                                                             : std::string(error.what())));
   }
   if (!output.inPlace()) verify(output, size);
   output.commit();

@@ -61,14 +61,7 @@ void checkSpec(const std::string& name, const OIIO::ImageSpec& spec, std::uint64
                                   formatBytes(needed), formatBytes(availableMemoryBytes())));
 }
 
-}  // namespace
-
-LoadedImage loadImage(const std::filesystem::path& path) {
-  const std::string name = path.string();
-  const std::uint64_t fileSize = checkedSize(name);
-  // Our own reader checks more.
-  if (isExr(name)) return fromExr(name);
-
+LoadedImage fromOther(const std::string& name, std::uint64_t fileSize) {
   const auto input = OIIO::ImageInput::open(name);
   if (!input) throw InputError(name, "is not a picture that can be read: " + OIIO::geterror());
   const OIIO::ImageSpec& spec = input->spec();
@@ -86,6 +79,22 @@ LoadedImage loadImage(const std::filesystem::path& path) {
       plane[i] = pixels[i * channels + source];
   }
   return loaded;
+}
+
+}  // namespace
+
+LoadedImage loadImage(const std::filesystem::path& path) {
+  const std::string name = path.string();
+  const std::uint64_t fileSize = checkedSize(name);
+  // Our own reader checks more.
+  if (isExr(name)) return fromExr(name);
+  try {
+    return fromOther(name, fileSize);
+  } catch (const Error&) {
+    throw;
+  } catch (const std::exception& error) {
+    throw InputError(name, fmt::format("is damaged: {}; write or copy it again", error.what()));
+  }
 }
 
 }  // namespace photosphere::image

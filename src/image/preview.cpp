@@ -89,6 +89,12 @@ std::string encodePng(int width, int height, std::span<const float> rgb) {
   return encode("picture.png", "png", {0, 0, width, height}, rgb, {});
 }
 
+void checkPreview(const std::filesystem::path& path, const ColorConfig& config,
+                  const DisplayOptions& options) {
+  formatOf(path);
+  config.displayConverter(options.renderingSpace, options.display, options.view);
+}
+
 void writePreview(const std::filesystem::path& path, const Image& image, const ColorConfig& config,
                   const DisplayOptions& options) {
   const std::string format = formatOf(path);

@@ -82,6 +82,15 @@ image::ExrAttributes header(const FrameResult& result,
   return image::frameAttributes(metadata);
 }
 
+image::DisplayOptions displayOptions(const std::string& space, const WriteRequest& request) {
+  image::DisplayOptions display;
+  display.renderingSpace = space;
+  display.display = request.ocioDisplay;
+  display.view = request.ocioView;
+  display.exposure = request.exposure;
+  return display;
+}
+
 }  // namespace
 
 image::Image frameImage(const FrameResult& result, const std::vector<std::string>& aovs) {
@@ -114,6 +123,14 @@ image::Image frameImage(const FrameResult& result, const std::vector<std::string
   return out;
 }
 
+void checkWriteRequest(const SceneFile& scene, const WriteRequest& request) {
+  const std::string& space = scene.output.text("colorspace");
+  const image::ColorConfig config = image::ColorConfig::load(request.ocioConfig);
+  config.chromaticities(space);
+  if (request.preview.empty()) return;
+  image::checkPreview(request.preview, config, displayOptions(space, request));
+}
+
 void writeFrame(FrameResult& result, const SceneFile& scene, const WriteRequest& request) {
   const Stopwatch watch;
   const std::string& space = scene.output.text("colorspace");
@@ -128,13 +145,8 @@ void writeFrame(FrameResult& result, const SceneFile& scene, const WriteRequest&
                     options);
   }
   if (!request.preview.empty()) {
-    image::DisplayOptions display;
-    display.renderingSpace = space;
-    display.display = request.ocioDisplay;
-    display.view = request.ocioView;
-    display.exposure = request.exposure;
     image::writePreview(framePath(request.preview, result.frame), frameImage(result, {"beauty"}),
-                        config, display);
+                        config, displayOptions(space, request));
   }
   result.statistics.seconds.write = watch.seconds();
   result.statistics.seconds.total += watch.seconds();

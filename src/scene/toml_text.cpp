@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <optional>
 
@@ -29,15 +30,90 @@ std::optional<std::size_t> indexOf(const std::string& segment) {
   return index;
 }
 
+[[noreturn]] void notToml(const std::string& name, std::size_t line, std::size_t column,
+                          std::string_view why) {
+  throw ConfigError(fmt::format("{}:{}:{}: not valid TOML: {}", name, line, column, why));
+}
+
+// The parser calls `é` outside of quotes impossible, where it should say so (toml++ 3.3,
+// is_non_ascii_horizontal_whitespace). TOML has such characters in strings and comments alone.
+void refuseBareUnicode(std::string_view text, const std::string& name) {
+  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);  // a mark that some editors set
+  std::size_t line = 1, lineBegin = 0;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    if (c == '\n') {
+      ++line;
+      lineBegin = i + 1;
+    } else if (c == '#') {
+      i = std::min(text.find('\n', i), text.size()) - 1;
+    } else if (c == '"' || c == '\'') {
+      const std::string_view mark(text.data() + i, 1);
+      const bool tripled = text.substr(i, 3) == std::string(3, c);
+      const std::string end = tripled ? std::string(3, c) : std::string(mark);
+      for (i += end.size(); i < text.size() && text.substr(i, end.size()) != end; ++i) {
+        if (c == '"' && text[i] == '\\') ++i;
+        if (i < text.size() && text[i] == '\n') {
+          if (!tripled) break;  // the parser will say that the string has no end
+          ++line;
+          lineBegin = i + 1;
+        }
+      }
+      if (i < text.size() && text[i] == '\n')
+        --i;
+      else
+        i += end.size() - 1;
+    } else if (static_cast<unsigned char>(c) >= 0x80) {
+      notToml(name, line, i - lineBegin + 1,
+              "a character that is not ASCII stands outside of quotes; put quotes around it");
+    }
+  }
+}
+
+bool stumbles(std::string_view text) {
+  try {
+    static_cast<void>(toml::parse(text));
+  } catch (const TomlAssertion&) {
+    return true;
+  } catch (const toml::parse_error&) {
+    // Cut in the middle of something.
+  }
+  return false;
+}
+
+// The line that the parser takes for impossible: it reads forward, so it stumbles over every
+// beginning of the text that holds that line.
+std::size_t lineOfAssertion(std::string_view text) {
+  std::vector<std::size_t> ends;
+  for (std::size_t end = text.find('\n'); end != std::string_view::npos;
+       end = text.find('\n', end + 1))
+    ends.push_back(end);
+  const auto at = std::partition_point(
+      ends.begin(), ends.end(), [&](std::size_t end) { return !stumbles(text.substr(0, end)); });
+  return static_cast<std::size_t>(at - ends.begin()) + 1;
+}
+
+// @throws ConfigError
+toml::table parseChecked(const std::string& text, const std::string& name) {
+  refuseBareUnicode(text, name);
+  try {
+    return toml::parse(text, name);
+  } catch (const toml::parse_error& error) {
+    notToml(name, error.source().begin.line, error.source().begin.column, error.description());
+  } catch (const TomlAssertion&) {
+    notToml(name, lineOfAssertion(text), 1, "the parser cannot make sense of this line");
+  }
+}
+
 // The value as TOML; text that is not TOML stands for itself.
 toml::table valueTable(const std::string& text) {
   try {
-    toml::table parsed = toml::parse("value = " + text);
+    toml::table parsed = parseChecked("value = " + text, "value");
     const toml::node* value = parsed.get("value");
     const bool usable = value && parsed.size() == 1 && !value->is_date() && !value->is_time() &&
                         !value->is_date_time();
     if (usable) return parsed;
-  } catch (const toml::parse_error&) {
+  } catch (const ConfigError&) {
     // Not TOML: a path or a name without quotes.
   }
   return toml::table{{"value", text}};
@@ -65,7 +141,38 @@ toml::node& descend(toml::node& at, const std::string& segment, const std::strin
   throw ConfigError(fmt::format("--set {}: nothing lies below a plain value ('{}')", set, segment));
 }
 
+// Whether the text is UTF-8, as TOML is: no byte out of place, nothing written longer than it must
+// be (RFC 3629).
+bool isUtf8(std::string_view text) {
+  for (std::size_t i = 0; i < text.size();) {
+    const auto byte = [&](std::size_t k) {
+      return i + k < text.size() ? static_cast<unsigned char>(text[i + k]) : 0u;
+    };
+    const unsigned first = byte(0);
+    if (first < 0x80) {
+      ++i;
+      continue;
+    }
+    const std::size_t more = first >= 0xF0 ? 3 : first >= 0xE0 ? 2 : 1;
+    if (first < 0xC2 || first > 0xF4) return false;
+    std::uint32_t code = first & (0x3Fu >> more);
+    for (std::size_t k = 1; k <= more; ++k) {
+      if ((byte(k) & 0xC0u) != 0x80u) return false;
+      code = code << 6 | (byte(k) & 0x3Fu);
+    }
+    const std::uint32_t least = more == 1 ? 0x80 : more == 2 ? 0x800 : 0x10000;
+    if (code < least || code > 0x10FFFF || (code >= 0xD800 && code <= 0xDFFF)) return false;
+    i += more + 1;
+  }
+  return true;
+}
+
 void applySet(toml::table& root, const std::string& set, TomlText& out) {
+  if (!isUtf8(set))
+    throw ConfigError(
+        fmt::format("--set {}: is not UTF-8, as a scene is; rename the file or set "
+                    "the terminal's encoding",
+                    set));
   const std::size_t equals = set.find('=');
   const std::string path = set.substr(0, equals);
   if (equals == std::string::npos || path.empty())
@@ -110,12 +217,7 @@ TomlText parseToml(const std::string& text, const std::string& name,
                    const std::vector<std::string>& sets) {
   TomlText out;
   out.name = name;
-  try {
-    out.root = toml::parse(text, name);
-  } catch (const toml::parse_error& error) {
-    throw ConfigError(fmt::format("{}:{}:{}: not valid TOML: {}", name, error.source().begin.line,
-                                  error.source().begin.column, error.description()));
-  }
+  out.root = parseChecked(text, name);
   for (const std::string& set : sets)
     applySet(out.root, set, out);
   return out;

@@ -4,7 +4,28 @@
 
 #define TOML_EXCEPTIONS 1
 #define TOML_HEADER_ONLY 1
+#include <stdexcept>
+
+namespace photosphere::scene {
+
+/// What the parser takes for impossible, and meets in text such as `[[[`.
+struct TomlAssertion : std::logic_error {
+  using std::logic_error::logic_error;
+};
+
+[[noreturn]] inline void throwTomlAssertion(const char* what) {
+  throw TomlAssertion(what);
+}
+
+}  // namespace photosphere::scene
+
+// In a release it would assume that it holds, else abort.
+#define TOML_ASSERT(expr) \
+  ((expr) ? static_cast<void>(0) : ::photosphere::scene::throwTomlAssertion(#expr))
+#pragma push_macro("NDEBUG")
+#undef NDEBUG
 #include <toml++/toml.h>
+#pragma pop_macro("NDEBUG")
 
 #include <map>
 #include <string>

@@ -14,6 +14,7 @@
 #include <system_error>
 #include <thread>
 
+#include "address_room.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/parallel.h"
 #include "photosphere/volume/vdb_file.h"
@@ -44,9 +45,8 @@ void setLimit(decltype(RLIMIT_AS) resource, rlim_t value) {
   dup2(pipe, STDERR_FILENO);
   const int nothing = open("/dev/null", O_WRONLY);
   if (nothing >= 0) dup2(nothing, STDOUT_FILENO);
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-  setLimit(RLIMIT_AS, limits.memory);  // sanitizers reserve terabytes of addresses
-#endif
+  // A sanitizer has reserved terabytes of addresses by now: under any limit nothing would work.
+  if (reservedAddresses() < limits.memory) setLimit(RLIMIT_AS, limits.memory);
   setLimit(RLIMIT_CPU, limits.cpuSeconds);
   setLimit(RLIMIT_CORE, 0);
   int code = 0;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <new>
 
+#include "address_room.h"
 #include "crash_guard.h"
 #include "openvdb_grid.h"
 #include "photosphere/core/error.h"
@@ -14,6 +15,10 @@
 namespace photosphere::volume {
 
 namespace {
+
+// A leaf of 512 voxels takes 2 to 12 KiB in memory and at least 130 bytes in the file. The walk has
+// counted the nodes; what points claim to hold, nothing has.
+constexpr std::uint64_t kLargestRatio = 128, kRoom = std::uint64_t(256) << 20;
 
 void load(const VdbContents& contents, VdbFile& result) {
   openvdb::io::File file(result.path);
@@ -63,6 +68,7 @@ VdbFile readVdb(const std::filesystem::path& path) {
   result.path = path.string();
   try {
     const CrashGuard guard(path);
+    const AddressRoom room(kRoom + kLargestRatio * contents.fileSize);
     load(contents, result);
     checkTransforms(result);
   } catch (const Error&) {
@@ -70,8 +76,8 @@ VdbFile readVdb(const std::filesystem::path& path) {
   } catch (const std::bad_alloc&) {
     throw InputError(
         result.path,
-        fmt::format("asks for more memory than there is ({} free, the file has {}): "
-                    "the file is damaged or too large for this machine",
+        fmt::format("asks for more memory than there is, or than its bytes can stand for ({} free, "
+                    "the file has {}): the file is damaged or too large for this machine",
                     formatBytes(availableMemoryBytes()), formatBytes(contents.fileSize)));
   } catch (const std::exception& error) {
     throw InputError(result.path, fmt::format("OpenVDB cannot read it: {}", error.what()));

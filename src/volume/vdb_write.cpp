@@ -3,7 +3,6 @@
 
 #include <cerrno>
 #include <fstream>
-#include <system_error>
 
 #include "openvdb_grid.h"
 #include "photosphere/core/error.h"
@@ -40,11 +39,7 @@ void writeTemporary(const OutputFile& file, const openvdb::GridCPtrVec& grids,
     out.flush();
     out.close();
   } catch (const std::ios_base::failure&) {
-    const int code = errno;
-    throw OutputError(
-        file.target().string(),
-        fmt::format("cannot be written: {}", code ? std::generic_category().message(code)
-                                                  : std::string("the device refused the data")));
+    throw OutputError(file.target().string(), "cannot be written: " + describeWriteError(errno));
   } catch (const openvdb::Exception& error) {
     throw OutputError(file.target().string(), fmt::format("OpenVDB: {}", error.what()));
   }

@@ -38,6 +38,10 @@ class OutputFile {
 /// Writes a text or binary blob as an OutputFile. @throws OutputError
 void writeFile(const std::filesystem::path& target, const std::string& content);
 
+/// Why a write failed and what to do about it, such as "No space left on device; free some, or
+/// write elsewhere". @param error  errno; 0 where nothing is known
+std::string describeWriteError(int error);
+
 /// Removes every temporary of this process. Async-signal-safe.
 void removeTemporaries() noexcept;
 

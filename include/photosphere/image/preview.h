@@ -29,6 +29,11 @@ std::string encodePreview(const Image& image, const ColorConfig& config,
 /// @throws ConfigError when `rgb` is not 3 * width * height values; OutputError
 std::string encodePng(int width, int height, std::span<const float> rgb);
 
+/// What writePreview would refuse before it has any pixels.
+/// @throws ConfigError for another extension, an unknown space, display or view
+void checkPreview(const std::filesystem::path& path, const ColorConfig& config,
+                  const DisplayOptions& options = {});
+
 /// Writes a PNG or JPEG, by the path's extension, of the display window: black outside the data
 /// window, premultiplied colour over black. Whole or not at all.
 /// @throws ConfigError for another extension, an unknown layer, space, display or view

@@ -93,6 +93,11 @@ struct WriteRequest {
 /// @param aovs  names from `layerNames`; empty = all. @throws ConfigError for others
 image::Image frameImage(const FrameResult& result, const std::vector<std::string>& aovs);
 
+/// Whether colour config, colour space, display and kind of preview are such that writeFrame will
+/// not stumble over them: to be known before the work. @throws ConfigError, InputMissingError,
+/// InputError
+void checkWriteRequest(const SceneFile& scene, const WriteRequest& request);
+
 /// Writes EXR and preview; sets statistics.seconds.write and adds it to the total.
 /// @throws ConfigError for unknown layers or colour spaces; OutputError
 void writeFrame(FrameResult& result, const SceneFile& scene, const WriteRequest& request);

@@ -124,6 +124,7 @@ int runRender(Options& options) {
   options.write.path = chooseOutput(scene, options.output);
   if (options.write.preview.empty())
     options.write.preview = scene.resolvePath(scene.output.text("preview"));
+  scene::checkWriteRequest(scene, options.write);
   return renderFrames(scene, options);
 }
 

@@ -1,0 +1,270 @@
+// Small sound files of everything that is read.
+
+#include <fmt/format.h>
+
+#include <cstring>
+
+#include "photosphere/caches/cache_format.h"
+#include "photosphere/core/error.h"
+#include "photosphere/core/log.h"
+#include "photosphere/estimators/light_cache.h"
+#include "photosphere/image/exr.h"
+#include "photosphere/volume/vdb_file.h"
+#include "support/support.h"
+#include "targets.h"
+
+namespace photosphere::fuzz {
+
+namespace {
+
+using caches::CacheContent;
+using test::TemporaryFolder;
+
+volume::ParticleSet someParticles() {
+  volume::ParticleSet set;
+  for (int i = 0; i < 6; ++i)
+    set.positions.emplace_back(i, 0.25 * i, -i);
+  set.add({"v", 3, std::vector<float>(18, 0.5f)});
+  set.add({"id", 1, std::vector<std::int32_t>(6, 7)});
+  return set;
+}
+
+volume::Grid someSmoke() {
+  std::vector<float> values(27);
+  for (std::size_t i = 0; i < values.size(); ++i)
+    values[i] = static_cast<float>(i);
+  return volume::denseToGrid("density", Vec3i(3), values, Mat4d(1));
+}
+
+/// Contents to offer a writer: it takes the first that its format can hold.
+std::vector<CacheContent> contents() {
+  CacheContent particles;
+  particles.particles.push_back(someParticles());
+  particles.particleNames.push_back("points");
+  CacheContent grids;
+  grids.grids.push_back(someSmoke());
+  return {particles, grids};
+}
+
+std::string written(const caches::CacheFormat& format, const std::string& file,
+                    const char* encoding = nullptr) {
+  const TemporaryFolder folder;
+  ParamValues options(format.params);
+  if (encoding) options.set("encoding", std::string(encoding), "specimen");
+  for (const CacheContent& content : contents()) {
+    try {
+      format.write(folder / file, content, options);
+      return test::readText(folder / file);
+    } catch (const ConfigError&) {
+      // Not what this format holds.
+    }
+  }
+  return {};
+}
+
+void addWritten(std::vector<Specimen>& all) {
+  for (const caches::CacheFormat* format : caches::cacheFormats()) {
+    if (!format->write || !format->read) continue;
+    for (const std::string_view extension : format->extensions) {
+      const bool first = extension == format->extensions.front();
+      std::string file = "a";
+      file += extension;
+      const std::string target(first ? format->name : extension.substr(1));
+      all.push_back({target, "written", written(*format, file)});
+    }
+    if (format->name == "ply")
+      for (const char* encoding : {"ascii", "binary_big_endian"})
+        all.push_back({"ply", encoding, written(*format, "a.ply", encoding)});
+  }
+}
+
+template <class T>
+void put(std::string& out, T value) {
+  out.append(reinterpret_cast<const char*>(&value), sizeof value);
+}
+
+/// A Mantaflow grid of dim^3 cells; type 1 is of numbers, 2 of vectors.
+std::string uniGrid(int dim, int gridType, int elementType) {
+  const int components = elementType == 2 ? 3 : 1;
+  std::string raw = "MNT3";
+  for (const int value : {dim, dim, dim, gridType, elementType, 4 * components})
+    put(raw, value);
+  raw.append(252, 'i');
+  put(raw, 0);
+  raw.append(8, '\0');
+  for (int i = 0; i < dim * dim * dim * components; ++i)
+    put(raw, static_cast<float>(i));
+  return raw;
+}
+
+std::string uniParticles(int count) {
+  std::string raw = "PB02";
+  for (const int value : {count, 8, 8, 8, 0, 16})
+    put(raw, value);
+  raw.append(264, '\0');
+  for (int i = 0; i < count; ++i) {
+    for (int c = 0; c < 3; ++c)
+      put(raw, static_cast<float>(i + c) * 0.5f);
+    put(raw, i == 1 ? 1 << 10 : 1);
+  }
+  return raw;
+}
+
+/// A particle file's header and what its zlib stream holds, for `prt.unpacked`.
+std::string unpackedPrt() {
+  std::string header("\xC0PRT\r\n\x1A\n", 8);
+  put(header, std::int32_t{56});
+  std::string signature = "Extensible Particle Format";
+  signature.resize(32, '\0');
+  header += signature;
+  put(header, std::int32_t{1});
+  put(header, std::int64_t{2});
+  for (const std::int32_t value : {4, 1, 44})
+    put(header, value);
+  std::string name = "Position";
+  name.resize(32, '\0');
+  header += name;
+  for (const std::int32_t value : {4, 3, 0})
+    put(header, value);
+  std::string out;
+  put(out, static_cast<std::uint16_t>(header.size()));
+  out += header;
+  for (int i = 0; i < 6; ++i)
+    put(out, 0.5f * static_cast<float>(i));
+  return out;
+}
+
+void addHandMade(std::vector<Specimen>& all) {
+  all.push_back({"ply", "lists",
+                 "ply\nformat ascii 1.0\nelement f 1\nproperty list uchar int i\nelement vertex 2\n"
+                 "property float x\nproperty float y\nproperty float z\nproperty list int uchar l\n"
+                 "end_header\n2 1 2\n0 0 0 1 1\n1 1 1 0\n"});
+  all.push_back({"pts", "colours", "2\n0 0 0 5 255 0 0\n1 1 1 5 0 255 0\n"});
+  const std::string grids[] = {uniGrid(3, 1, 1), uniGrid(2, 12, 2), uniParticles(5)};
+  const char* const names[] = {"numbers", "staggered", "particles"};
+  for (int i = 0; i < 3; ++i) {
+    all.push_back({"uni", names[i], gzip(grids[i], 9)});
+    all.push_back({"uni.unpacked", names[i], grids[i]});
+  }
+  all.push_back({"prt.unpacked", "positions", unpackedPrt()});
+  all.push_back({"detect", "ply", "ply\nformat ascii 1.0\n"});
+}
+
+std::string lightCache(estimators::Carrier carrier) {
+  estimators::LightField field;
+  field.layout.basis = estimators::Basis::histogram;
+  field.layout.carrier = carrier;
+  field.layout.deposit = carrier == estimators::Carrier::voxels ? estimators::Deposit::trackLength
+                                                                : estimators::Deposit::collision;
+  field.layout.rows = 1;
+  field.layout.channels = 1;
+  field.layout.radius = field.layout.depositRadius = 0.5;
+  const std::vector<Vec3i> voxels{{1, 2, 3}, {1, 2, 4}, {9, 2, 3}};
+  if (carrier == estimators::Carrier::voxels)
+    field.lattice = transport::SupportLattice(Vec3d(-1), 0.25, Vec3i(2, 1, 1), voxels);
+  else
+    field.particles = {Vec3f(0.1f), Vec3f(0.2f), Vec3f(0.7f)};
+  for (int i = 0; i < 3 * 8; ++i)
+    field.values.push_back(static_cast<float>(i));
+  const TemporaryFolder folder;
+  estimators::writeLightCache(folder / "a.vdb", field, {"m", "l", {}});
+  return test::readText(folder / "a.vdb");
+}
+
+void addVolumes(std::vector<Specimen>& all) {
+  const TemporaryFolder folder;
+  volume::ParticleSet points;
+  points.positions = {Vec3d(0.1), Vec3d(0.2, 0.3, 0.9), Vec3d(1.5)};
+  points.add({"v", 3, std::vector<float>{1, 2, 3, 4, 5, 6, 7, 8, 9}});
+  points.add({"label", 1, std::vector<std::string>{"a", "b", "a"}});
+  volume::writeVdb(folder / "a.vdb", {someSmoke(), volume::pointsToGrid(points, "points", 1)},
+                   {{"note", "made to be damaged"}});
+  for (const char* target : {"vdb", "vdb.walk"})
+    all.push_back({target, "smoke_and_points", test::readText(folder / "a.vdb")});
+  all.push_back({"light_cache", "voxels", lightCache(estimators::Carrier::voxels)});
+  all.push_back({"light_cache", "particles", lightCache(estimators::Carrier::particles)});
+}
+
+std::string exr(image::ExrCompression compression) {
+  image::Image picture(5, 18);
+  picture.addLayer("", image::ChannelKind::color);
+  picture.addChannel("Z", image::ChannelKind::data);
+  for (int i = 0; i < 5 * 18; ++i)
+    picture.setRgb("", i % 5, i / 5, Rgb(0.01f * static_cast<float>(i), 1.0f, 2.5f));
+  const TemporaryFolder folder;
+  image::writeExr(folder / "a.exr", picture, {{"note", std::string("text")}},
+                  {.compression = compression});
+  return test::readText(folder / "a.exr");
+}
+
+/// Radiance picture of 8 x 4 pixels: a run and literals in every line.
+std::string radiance() {
+  std::string out = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\nEXPOSURE=1\n\n-Y 4 +X 8\n";
+  for (int y = 0; y < 4; ++y) {
+    out += std::string("\x02\x02\x00\x08", 4);
+    for (int c = 0; c < 4; ++c) {
+      out += static_cast<char>(128 + 4);
+      out += static_cast<char>(c == 3 ? 129 : 40 * c + y);
+      out += '\x04';
+      for (int x = 0; x < 4; ++x)
+        out += static_cast<char>(c == 3 ? 128 + x : 7 * x + y);
+    }
+  }
+  return out;
+}
+
+void addPictures(std::vector<Specimen>& all) {
+  using image::ExrCompression;
+  const std::pair<const char*, ExrCompression> compressions[] = {
+      {"zip", ExrCompression::zip}, {"piz", ExrCompression::piz}, {"dwaa", ExrCompression::dwaa}};
+  for (const auto& [name, compression] : compressions)
+    all.push_back({"exr", name, exr(compression)});
+  all.push_back({"exr.scan", "rle", exr(ExrCompression::rle)});
+  all.push_back({"hdr", "runs", radiance()});
+}
+
+void addTexts(std::vector<Specimen>& all) {
+  all.push_back({"scene", "keyed", R"([scene]
+fps = "24000/1001"
+frames = "1-5x2"
+[camera]
+position = [{ frame = 1, value = [0, 0, 5] }, { frame = 4, value = [1, 0, 5] }]
+fov = 30
+[[volume]]
+file = "smoke.####.vdb"
+density_scale = [1, 2, 3.5]
+phase = { type = "draine", g = 0.5 }
+emission = { grid = "flame", scale = 2, color = [1, 0.5, 0.2] }
+[[light]]
+type = "spot"
+intensity = 1e1
+[output]
+aovs = ["beauty", 'single']
+)"});
+  for (const auto& entry : std::filesystem::directory_iterator(test::projectFile("data/scenes")))
+    all.push_back({"scene", entry.path().stem().string(), test::readText(entry.path())});
+  all.push_back({"overrides", "several",
+                 "volume.0.density_scale=4\nlight.1.type=point\ncamera.look_at=[1, 2, 3]\n"
+                 "render.samples=2\nvolume.0.file=other.vdb\n"});
+  all.push_back({"frames", "range", "3,4,10-20x2,5-1,-10--5,1-5y2"});
+  all.push_back({"chan", "shot",
+                 "# frame, translation, rotation, field of view\n1 0 0 5 0 0 0 40\n"
+                 "2\t+0.5 -1e-1 5 10 20 -30 41.5\r\n\n3 1 0 5 0 0 0 42\n"});
+}
+
+}  // namespace
+
+std::vector<Specimen> specimens() {
+  const log::Level level = log::level();
+  log::setLevel(log::Level::off);  // of what a format cannot hold
+  std::vector<Specimen> all;
+  addWritten(all);
+  addHandMade(all);
+  addVolumes(all);
+  addPictures(all);
+  addTexts(all);
+  log::setLevel(level);
+  return all;
+}
+
+}  // namespace photosphere::fuzz

@@ -1,0 +1,140 @@
+#include "trial.h"
+
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <new>
+
+#include "allocation_limit.h"
+#include "photosphere/core/error.h"
+#include "photosphere/core/log.h"
+
+namespace photosphere::fuzz {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// One process is asked so often before the next begins: memory that one input damaged must not be
+/// there for all.
+constexpr std::size_t kBatch = 100;
+
+bool ofTheInput(ExitCode code) {
+  return code == ExitCode::usage || code == ExitCode::inputMissing ||
+         code == ExitCode::inputInvalid || code == ExitCode::memory;
+}
+
+/// @return what is wrong with how the input ended, or nothing
+std::string give(const Target& target, const std::string& bytes, const fs::path& folder,
+                 Outcomes& outcomes) {
+  try {
+    target.read(bytes, folder);
+    ++outcomes.read;
+  } catch (const Error& error) {
+    if (!ofTheInput(error.code()) || error.what()[0] == '\0')
+      return std::string("an error of another kind: ") + error.what();
+    ++outcomes.refused;
+  } catch (const std::exception& error) {
+    return std::string("no Error: ") + error.what();
+  }
+  return {};
+}
+
+void giveHere(const Target& target, const std::string& bytes, const std::string& what,
+              const fs::path& folder, Outcomes& outcomes) {
+  // Deflate makes up to 1032 bytes of one, and a reader may hold them twice.
+  const AllocationLimit limit(target.room + 2100 * bytes.size());
+  const std::string complaint = give(target, bytes, folder, outcomes);
+  const std::size_t refused = limit.refused();
+  if (refused > 0)
+    ADD_FAILURE() << what << ": asked for " << refused << " bytes of memory for an input of "
+                  << bytes.size();
+  if (!complaint.empty()) ADD_FAILURE() << what << ": " << complaint;
+}
+
+/// What a process of its own leaves behind when it ends early.
+struct Shared {
+  std::size_t next = 0;  ///< input that it is at
+  Outcomes outcomes;
+};
+
+void limitMemoryAndTime() {
+  const struct rlimit memory { rlim_t(2) << 30, rlim_t(2) << 30 }, cpu{60, 62}, core{0, 0};
+  if (!test::kSanitized) setrlimit(RLIMIT_AS, &memory);  // a sanitizer reserves terabytes
+  setrlimit(RLIMIT_CPU, &cpu);
+  setrlimit(RLIMIT_CORE, &core);
+}
+
+/// Gives inputs from `shared.next` to `end` in a process of its own. @return how that ended
+int giveInChild(const Target& target, std::size_t end,
+                const std::function<std::string(std::size_t)>& input, const fs::path& folder,
+                Shared& shared) {
+  const fs::path report = folder / "report";
+  const pid_t child = fork();
+  if (child < 0) return -1;
+  if (child == 0) {
+    limitMemoryAndTime();
+    dup2(open(report.c_str(), O_CREAT | O_TRUNC | O_WRONLY, 0600), STDERR_FILENO);
+    for (; shared.next < end; ++shared.next) {
+      const std::string complaint = give(target, input(shared.next), folder, shared.outcomes);
+      if (complaint.empty()) continue;
+      const ssize_t ignored = write(STDERR_FILENO, complaint.data(), complaint.size());
+      static_cast<void>(ignored);
+      _exit(11);
+    }
+    _exit(0);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+}
+
+Outcomes giveInChildren(const Target& target, std::size_t count,
+                        const std::function<std::string(std::size_t)>& input,
+                        const std::function<std::string(std::size_t)>& what,
+                        const fs::path& folder) {
+  void* memory =
+      mmap(nullptr, sizeof(Shared), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  if (memory == MAP_FAILED) {
+    ADD_FAILURE() << "no memory to share";
+    return {};
+  }
+  Shared& shared = *new (memory) Shared;
+  while (shared.next < count) {
+    const int code =
+        giveInChild(target, std::min(count, shared.next + kBatch), input, folder, shared);
+    if (code == 0) continue;
+    if (code == static_cast<int>(ExitCode::inputInvalid))
+      ++shared.outcomes.guarded;
+    else
+      ADD_FAILURE() << what(shared.next) << ": ended with " << code << '\n'
+                    << test::readText(folder / "report");
+    ++shared.next;
+  }
+  const Outcomes outcomes = shared.outcomes;
+  munmap(memory, sizeof(Shared));
+  return outcomes;
+}
+
+}  // namespace
+
+Outcomes attempt(const Target& target, std::size_t count,
+                 const std::function<std::string(std::size_t)>& input,
+                 const std::function<std::string(std::size_t)>& what) {
+  const test::TemporaryFolder folder;
+  const log::Level level = log::level();
+  log::setLevel(log::Level::off);
+  Outcomes outcomes;
+  if (target.isolated)
+    outcomes = giveInChildren(target, count, input, what, folder.path());
+  else
+    for (std::size_t i = 0; i < count; ++i)
+      giveHere(target, input(i), what(i), folder.path(), outcomes);
+  log::setLevel(level);
+  return outcomes;
+}
+
+}  // namespace photosphere::fuzz
