@@ -11,6 +11,7 @@
 #include "photosphere/core/interrupt.h"
 #include "photosphere/core/log.h"
 #include "photosphere/core/resources.h"
+#include "photosphere/volume/invalid_values.h"
 #include "photosphere/volume/rasterize.h"
 #include "photosphere/volume/vdb_file.h"
 #include "print.h"
@@ -40,6 +41,23 @@ ParamValues valuesFor(const caches::CacheFormat& format, const ConvertOptions& o
   return values;
 }
 
+/// What no renderer takes does not go on unseen.
+void heedInvalid(caches::CacheContent& file, const std::string& path,
+                 const ConvertOptions& options) {
+  for (Grid& grid : file.grids) {
+    if (grid.kind() != volume::GridKind::scalar && grid.kind() != volume::GridKind::vector)
+      continue;
+    const bool negatives = grid.name() == options.density;
+    const volume::InvalidValues found = volume::findInvalid(grid, negatives);
+    if (found.total() == 0) continue;
+    const std::string what = fmt::format("grid '{}' holds {}", grid.name(), found.text());
+    if (!options.allowInvalid)
+      throw InputError(path, what + "; clean the cache, or give --allow-invalid to write zeros");
+    log::warning("{}: {}; zeros are written", path, what);
+    grid = volume::withInvalidAsZero(grid, negatives);
+  }
+}
+
 caches::CacheContent readInputs(const std::vector<std::string>& inputs,
                                 const ConvertOptions& options) {
   caches::CacheContent content;
@@ -50,6 +68,7 @@ caches::CacheContent readInputs(const std::vector<std::string>& inputs,
     caches::CacheContent file = format.read(path, valuesFor(format, options));
     for (const std::string& note : file.notes)
       log::info("{}: {}", path, note);
+    heedInvalid(file, path, options);
     place(file, options.placement, format);
     mergeContent(content, std::move(file), path);
     throwIfInterrupted();

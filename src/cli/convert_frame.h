@@ -17,6 +17,7 @@ struct ConvertOptions {
   double voxelSize = 0;             ///< of the rasterized grid [scene units]; 0 = chosen
   std::uint64_t particles = 60000;  ///< seeded where there are grids only
   std::uint64_t seed = 1;
+  bool allowInvalid = false;  ///< NaN, infinite and, in `density`, negative values become zero
   std::vector<std::pair<std::string, std::string>> formatOptions;  ///< name, value
 };
 

@@ -72,6 +72,8 @@ void addPlanOptions(CLI::App& app, SceneOptions& options) {
   addScenePaths(app, options);
   app.add_flag("--allow-stale", options.allowStale,
                "Use a light cache that was made for another medium or other lights");
+  app.add_flag("--allow-invalid", options.allowInvalid,
+               "Treat NaN, infinite and negative values of caches as zero [exit 4]");
   app.add_option("--cache-offset", options.cacheOffset,
                  "Frame of the caches minus frame of the picture [0]")
       ->type_name("N")
@@ -98,8 +100,10 @@ scene::SceneFile openScene(const SceneOptions& options) {
   }
   if (options.seed) sets.push_back(fmt::format("scene.seed={}", *options.seed));
   const std::filesystem::path path(options.scene);
-  scene::SceneFile scene = path.extension() == ".toml" ? scene::loadScene(path, sets)
-                                                       : scene::sceneForVolume(path, sets);
+  scene::SceneFile scene = path.extension() == ".toml"
+                               ? scene::loadScene(path, sets)
+                               : scene::sceneForVolume(path, sets, options.allowInvalid);
+  scene.allowInvalid = options.allowInvalid;
   if (!options.colorspace.empty())
     scene.output.set("colorspace", options.colorspace, "--colorspace");
   for (const std::string& choice : scene.choices)

@@ -22,7 +22,7 @@ struct SceneOptions {
   std::int64_t cacheOffset = 0;
   std::string cacheHold;
   std::string stats;
-  bool allowStale = false;
+  bool allowStale = false, allowInvalid = false;
   bool dumpScene = false;
   ResumeOptions resume;
   FrameOptions frames;

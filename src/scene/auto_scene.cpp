@@ -209,7 +209,8 @@ std::string cameraText(const Box3d& box, const Vec3d& up, const Mat4d& placement
 
 }  // namespace
 
-SceneFile sceneForVolume(const std::filesystem::path& path, const std::vector<std::string>& sets) {
+SceneFile sceneForVolume(const std::filesystem::path& path, const std::vector<std::string>& sets,
+                         bool allowInvalid) {
   const std::string pattern = std::filesystem::absolute(path).lexically_normal().string();
   std::int64_t frame = 1;
   std::vector<std::string> choices;
@@ -226,8 +227,9 @@ SceneFile sceneForVolume(const std::filesystem::path& path, const std::vector<st
       isSet(sets, "volume.0.density") ? "density" : chooseDensity(cache, choices);
 
   // A first set-up at scale 1 says where the smoke is and how deep.
-  const SceneFile probe =
+  SceneFile probe =
       parseScene(volumeText(pattern, density, 1.0), pattern, folder, volumeSets(sets));
+  probe.allowInvalid = allowInvalid;
   const FrameSetup smoke = setUpFrame(probe, frame);
   if (smoke.worldBounds.empty())
     throw InputError(framePath(pattern, frame), fmt::format("grid '{}' holds no smoke", density));
@@ -245,6 +247,7 @@ SceneFile sceneForVolume(const std::filesystem::path& path, const std::vector<st
                                 kAnisotropy));
   SceneFile scene = parseScene(text, pattern, folder, sets);
   scene.choices = std::move(choices);
+  scene.allowInvalid = allowInvalid;
   return scene;
 }
 

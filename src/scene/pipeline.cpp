@@ -30,12 +30,12 @@ render::Crop clippedCrop(const std::optional<render::Crop>& wished, const Vec2i&
 
 void checkSamples(const render::FrameLayers& layers) {
   if (layers.nanSamples == 0 && layers.negativeSamples == 0) return;
-  throw Error(
-      ExitCode::unspecified,
+  throw SampleError(
       fmt::format("{} samples are NaN or infinite and {} negative, the first in pixel "
                   "({}, {}); the frame is not written. This is a defect: please report it "
                   "with the scene",
-                  layers.nanSamples, layers.negativeSamples, layers.firstBad.x, layers.firstBad.y));
+                  layers.nanSamples, layers.negativeSamples, layers.firstBad.x, layers.firstBad.y),
+      layers.nanSamples, layers.negativeSamples);
 }
 
 void measureImage(const render::FrameLayers& layers, FrameStatistics& statistics) {

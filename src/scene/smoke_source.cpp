@@ -9,6 +9,7 @@
 #include "photosphere/core/frames.h"
 #include "photosphere/core/log.h"
 #include "photosphere/core/resources.h"
+#include "photosphere/volume/invalid_values.h"
 #include "photosphere/volume/rasterize.h"
 #include "photosphere/volume/vdb_file.h"
 #include "photosphere/volume/velocity.h"
@@ -55,6 +56,22 @@ void checkAffine(const std::string& path, const Grid& grid) {
                                      grid.name()));
 }
 
+// Invalid values end the frame, or become zero where the user allows that.
+// @param key  what the grid is used as
+void heedInvalid(const SceneFile& scene, std::string_view key, bool negatives, Grid& grid,
+                 VolumeSource& source) {
+  const volume::InvalidValues found = volume::findInvalid(grid, negatives);
+  if (found.total() == 0) return;
+  if (!scene.allowInvalid)
+    throw InputError(source.path,
+                     fmt::format("grid '{}', used as {}, holds {}; clean the cache, or give "
+                                 "--allow-invalid to treat them as zero",
+                                 grid.name(), key, found.text()));
+  source.notes.push_back(fmt::format("{}: grid '{}', used as {}: {}; all are treated as zero",
+                                     source.path, grid.name(), key, found.text()));
+  grid = volume::withInvalidAsZero(grid, negatives);
+}
+
 // One set of all particles of a file; the attributes of the first system decide when there are
 // several.
 volume::ParticleSet pointsOf(const CacheGrids& cache) {
@@ -66,14 +83,30 @@ volume::ParticleSet pointsOf(const CacheGrids& cache) {
   return volume::gridToPoints(cache.pointGrids.front());
 }
 
-Grid rasterized(const CacheGrids& cache, const VolumeEntry& entry, bool wantVelocity,
-                VolumeSource& source) {
+// Particles that rasterizing left out.
+void heedSkipped(const SceneFile& scene, const volume::RasterizeResult& result, std::size_t points,
+                 VolumeSource& source) {
+  if (result.skipped == 0) return;
+  const std::string what = fmt::format(
+      "{} of {} particles have a position, radius or mass that is negative or not finite, the first "
+      "is number {}",
+      result.skipped, points, result.firstSkipped);
+  if (!scene.allowInvalid)
+    throw InputError(source.path,
+                     fmt::format("{}; clean the cache, or give --allow-invalid to leave them out",
+                                 what));
+  source.notes.push_back(fmt::format("{}: {}; they are left out", source.path, what));
+}
+
+Grid rasterized(const SceneFile& scene, const CacheGrids& cache, const VolumeEntry& entry,
+                bool wantVelocity, VolumeSource& source) {
   const Stopwatch watch;
   volume::RasterizeOptions options;
   options.radius = entry.values.real("particle_radius");
   const volume::ParticleSet points = pointsOf(cache);
   if (points.size() == 0) return {};
   const volume::RasterizeResult result = volume::rasterize(points, options);
+  heedSkipped(scene, result, points.size(), source);
   source.notes.push_back(
       fmt::format("{}: {} points rasterized at voxel edge {:.4g}, radius {:.4g} to {:.4g}{}",
                   cache.path, points.size(), result.voxelSize, result.radiusMin, result.radiusMax,
@@ -159,13 +192,14 @@ VolumeSource readVolume(const SceneFile& scene, const VolumeEntry& entry, std::i
   if (cache.grids.empty() && cache.pointGrids.empty())
     throw InputError(source.path, "holds neither grids nor points");
   if (cache.grids.empty()) {
-    source.density = rasterized(cache, entry, wishes.velocity, source);
+    source.density = rasterized(scene, cache, entry, wishes.velocity, source);
   } else {
     source.density = findGrid(cache, "density", entry.values.text("density"));
     if (source.density.kind() != GridKind::scalar)
       throw InputError(source.path,
                        fmt::format("grid '{}' is of type {}; a density is one number a voxel",
                                    source.density.name(), source.density.valueType()));
+    heedInvalid(scene, "density", true, source.density, source);
     // A rasterized grid has its values at its nodes already.
     if (entry.values.flag("cell_centered")) source.indexShift = Vec3d(0.5);
   }
@@ -178,10 +212,12 @@ VolumeSource readVolume(const SceneFile& scene, const VolumeEntry& entry, std::i
                        fmt::format("grid '{}' is of type {}; a velocity is a vector a voxel", name,
                                    source.velocity.valueType()));
     checkAffine(source.path, source.velocity);
+    heedInvalid(scene, "velocity", false, source.velocity, source);
   }
   if (!entry.albedoGrid.empty()) {
     source.albedo = findGrid(cache, "albedo", entry.albedoGrid);
     checkAffine(source.path, source.albedo);
+    heedInvalid(scene, "albedo", true, source.albedo, source);
     checkAlbedo(source.path, source.albedo);
   }
   if (wishes.emission && entry.emits) {
@@ -194,6 +230,7 @@ VolumeSource readVolume(const SceneFile& scene, const VolumeEntry& entry, std::i
                        fmt::format("grid '{}' is of type {}; an emission is one number a voxel",
                                    source.emission.name(), source.emission.valueType()));
     checkAffine(source.path, source.emission);
+    heedInvalid(scene, "emission", temperature.empty(), source.emission, source);
   }
   if (wishes.particles)
     for (const Grid& grid : cache.pointGrids)

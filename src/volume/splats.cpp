@@ -89,7 +89,7 @@ std::vector<Blob> collectBlobs(const ParticleSet& particles, const RasterizeOpti
     const bool valid = std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z) &&
                        std::isfinite(radius) && radius >= 0 && std::isfinite(mass) && mass >= 0;
     if (!valid) {
-      ++result.skipped;
+      if (result.skipped++ == 0) result.firstSkipped = i;
       return;
     }
     blobs.push_back({p, radius, mass});

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "photosphere/core/checkpoint.h"
+#include "photosphere/core/error.h"
 #include "photosphere/estimators/light_shard.h"
 #include "photosphere/image/exr.h"
 #include "photosphere/image/image.h"
@@ -73,9 +74,21 @@ struct FrameResult {
   std::vector<std::string> notes;
 };
 
+/// A frame that holds what no picture may.
+class SampleError : public Error {
+ public:
+  SampleError(const std::string& message, std::uint64_t nans, std::uint64_t negatives)
+      : Error(ExitCode::unspecified, message), m_nans(nans), m_negatives(negatives) {}
+  std::uint64_t nans() const { return m_nans; }  ///< samples that are NaN or infinite
+  std::uint64_t negatives() const { return m_negatives; }
+
+ private:
+  std::uint64_t m_nans, m_negatives;
+};
+
 /// Renders one frame.
-/// @throws what setUpFrame throws; MemoryError before tracing; Error naming the first pixel when a
-///         sample is NaN or negative; InterruptedError
+/// @throws what setUpFrame throws; MemoryError before tracing; SampleError naming the first pixel
+///         when a sample is NaN or negative; InterruptedError
 FrameResult renderScene(const SceneFile& scene, std::int64_t frame,
                         const RenderRequest& request = {});
 

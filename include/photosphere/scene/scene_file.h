@@ -46,6 +46,9 @@ struct SceneFile {
   std::vector<VolumeEntry> volumes;
   std::vector<LightEntry> lights;
   ParamValues estimator, effects, render, output;
+  /// NaN, infinite and negative values of caches count as zero, and particles that have them are
+  /// left out; else they end the frame (exit 4).
+  bool allowInvalid = false;
   /// What sceneForVolume chose, one sentence each; empty for a scene that was read.
   std::vector<std::string> choices;
 
@@ -107,9 +110,10 @@ std::string dumpScene(const SceneFile& scene);
 /// extinction scaled to a useful optical depth, a camera that frames the smoke and one key light.
 /// `choices` says what was chosen and why.
 /// @param path  any cache that module `caches` reads; a path with `####` uses the first frame found
-/// @param sets  applied over what was chosen
+/// @param sets          applied over what was chosen
+/// @param allowInvalid  as SceneFile::allowInvalid, which it sets
 /// @throws InputMissingError, InputError, ConfigError
 SceneFile sceneForVolume(const std::filesystem::path& path,
-                         const std::vector<std::string>& sets = {});
+                         const std::vector<std::string>& sets = {}, bool allowInvalid = false);
 
 }  // namespace photosphere::scene

@@ -28,6 +28,7 @@ struct RasterizeResult {
   double massGrid = 0;       ///< sum of density times voxel volume
   std::uint64_t skipped =
       0;  ///< particles with a position, radius or mass that is not finite or < 0
+  std::uint64_t firstSkipped = 0;  ///< number of the first of them, from 0
 };
 
 /// Mass of a particle: `mass`, else density * 4/3 pi r^3 with r its `pscale`, or the radius where

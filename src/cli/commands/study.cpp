@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <memory>
 
 #include "command.h"
@@ -13,6 +14,7 @@
 #include "photosphere/core/log.h"
 #include "photosphere/core/parallel.h"
 #include "photosphere/study/paper.h"
+#include "photosphere/study/stability.h"
 #include "photosphere/study/study.h"
 #include "print.h"
 
@@ -23,14 +25,25 @@ namespace {
 struct Options {
   study::StudyOptions study;
   std::string scene, output, cache, resolution, frames;
-  bool noHardCases = false, noFlicker = false, paper = false;
+  bool noHardCases = false, noFlicker = false, paper = false, hard = false;
+  std::vector<std::string> cases;
 };
 
+// What to work on is said once.
+void checkSubject(const Options& options) {
+  const bool own = options.paper || options.hard;
+  if (options.paper && options.hard) throw ConfigError("give --paper or --hard, not both");
+  if (own != options.scene.empty())
+    throw ConfigError(own ? fmt::format("{} has scenes of its own; leave SCENE out",
+                                        options.paper ? "--paper" : "--hard")
+                          : "SCENE is required; or give --paper for the paper's exhibits, --hard "
+                            "for the table of hard cases");
+  if (!options.hard && !options.cases.empty()) throw ConfigError("--case goes with --hard alone");
+  if (!options.hard && options.output.empty()) throw ConfigError("-o DIR is required");
+}
+
 void complete(Options& options) {
-  if (options.paper != options.scene.empty())
-    throw ConfigError(options.paper
-                          ? "--paper has scenes of its own; leave SCENE out"
-                          : "SCENE is required; or give --paper for the paper's exhibits");
+  checkSubject(options);
   study::StudyOptions& s = options.study;
   s.scene = options.scene;
   s.output = options.output;
@@ -74,8 +87,32 @@ int reportSweeps(const study::StudyOptions& s) {
   return static_cast<int>(ExitCode::ok);
 }
 
+// The table goes to standard output, with -o as CSV too. Any row outside its bound is exit 7.
+int reportHardCases(const Options& options) {
+  for (const bool unused : {!options.study.sets.empty(), !options.resolution.empty(),
+                            !options.frames.empty(), options.study.minutes > 0})
+    if (unused)
+      throw ConfigError(
+          "--hard runs its catalogue as it is: --set, --res, --frames and --minutes do not go with "
+          "it");
+  checkWritable(options.output);
+  study::StabilityOptions hard;
+  hard.quick = options.study.quick;
+  hard.cases = options.cases;
+  hard.estimators = options.study.families;
+  printLine("{}", study::stabilityHead());
+  const std::vector<study::StabilityRow> rows = study::runStability(
+      hard, [](const study::StabilityRow& row) { printLine("{}", study::stabilityLine(row)); });
+  const auto failed = std::count_if(rows.begin(), rows.end(),
+                                    [](const study::StabilityRow& row) { return !row.passed; });
+  if (!options.output.empty()) study::writeStabilityCsv(options.output, rows);
+  printLine("{} rows, {} outside their bounds", rows.size(), failed);
+  return static_cast<int>(failed > 0 ? ExitCode::accuracy : ExitCode::ok);
+}
+
 int runStudy(Options& options) {
   complete(options);
+  if (options.hard) return reportHardCases(options);
   try {
     return options.paper ? reportPaper(options.study) : reportSweeps(options.study);
   } catch (const InterruptedError& stopped) {
@@ -123,9 +160,16 @@ std::function<int()> declareStudy(CLI::App& app) {
       ->type_name("FILE");
   app.add_flag("--paper", options->paper,
                "The exhibits of Min & Ihm 2010 on the shipped smoke, in place of a scene");
-  app.add_option("-o,--output", options->output, "Folder of index.html, study.csv and study.json")
-      ->type_name("DIR")
-      ->required();
+  app.add_flag("--hard", options->hard,
+               "The table of hard cases: what is numerically hard, the known answer, the result; "
+               "exit 7 when a row is outside its bound");
+  app.add_option("--case", options->cases,
+                 "With --hard: only cases whose names begin so; repeatable [all]")
+      ->type_name("NAME")
+      ->allow_extra_args(false);
+  app.add_option("-o,--output", options->output,
+                 "Folder of index.html, study.csv and study.json; with --hard, the table as CSV")
+      ->type_name("DIR");
   declareSettings(app, *options);
   study::StudyOptions& s = options->study;
   const char* group = "Pictures";

@@ -1,0 +1,366 @@
+// The table of hard cases: catalogue in, rows out.
+
+#include "photosphere/study/stability.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "child.h"
+#include "machine.h"
+#include "photosphere/core/error.h"
+#include "photosphere/core/hash.h"
+#include "stability_catalogue.h"
+#include "stability_frame.h"
+#include "stability_slabs.h"
+#include "stability_smoke.h"
+#include "stability_traces.h"
+
+namespace photosphere::study {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+using Sets = std::vector<std::string>;
+
+constexpr double kCpuLimit = 120, kQuickCpuLimit = 30;  // seconds a run
+constexpr int kFiner = 10;
+
+void append(Sets& to, const Sets& more) {
+  to.insert(to.end(), more.begin(), more.end());
+}
+
+// Lamps in place of the scene's one, with its light in equal parts.
+void shareLight(scene::SceneFile& scene, int lamps) {
+  if (lamps < 2) return;
+  scene::LightEntry part = scene.lights.front();
+  part.values.set("intensity", part.values.real("intensity") / lamps, part.where);
+  scene.lights.assign(static_cast<std::size_t>(lamps), part);
+}
+
+std::string numberText(double value) {
+  return fmt::format("{:.6g}", value);
+}
+
+class Table {
+ public:
+  Table(const StabilityOptions& options, const std::function<void(const StabilityRow&)>& each)
+      : m_options(options),
+        m_each(each),
+        m_catalogue(readStabilityCatalogue(
+            options.catalogue.empty() ? shippedStabilityCatalogue() : options.catalogue)),
+        m_folder(fs::temp_directory_path() / fmt::format("photosphere-hard-{}", getpid())) {
+    checkNames();
+  }
+
+  std::vector<StabilityRow> run() {
+    for (const StabilityCase& c : m_catalogue.cases) {
+      if (!wanted(c.name) || (m_options.quick && !c.quick)) continue;
+      m_frames.clear();
+      if (c.trace == "slab_radiance")
+        runSlabRadiance(c);
+      else if (!c.trace.empty())
+        runTrace(c);
+      else
+        for (const StabilityEstimator* e : estimatorsOf(c))
+          runFrame(c, *e);
+    }
+    return std::move(m_rows);
+  }
+
+ private:
+  bool wanted(const std::string& name) const {
+    return m_options.cases.empty() ||
+           std::any_of(m_options.cases.begin(), m_options.cases.end(),
+                       [&](const std::string& begin) { return name.starts_with(begin); });
+  }
+
+  // A name that nothing has would pass by testing nothing.
+  void checkNames() const {
+    const auto known = [&](const std::string& name) {
+      return std::any_of(m_catalogue.estimators.begin(), m_catalogue.estimators.end(),
+                         [&](const StabilityEstimator& e) { return e.name == name; });
+    };
+    const auto refuse = [](const std::string& where, const std::string& name) {
+      throw ConfigError(fmt::format("{}: no estimator of the catalogue is named '{}'", where, name));
+    };
+    for (const std::string& name : m_options.estimators)
+      if (!known(name)) refuse("--family", name);
+    for (const StabilityCase& c : m_catalogue.cases)
+      for (const Sets* names : {&c.estimators, &c.quickEstimators})
+        for (const std::string& name : *names)
+          if (!known(name)) refuse(c.name, name);
+    for (const std::string& begin : m_options.cases)
+      if (std::none_of(m_catalogue.cases.begin(), m_catalogue.cases.end(),
+                       [&](const StabilityCase& c) { return c.name.starts_with(begin); }))
+        throw ConfigError(fmt::format("--case {}: no hard case has a name that begins so", begin));
+  }
+
+  std::vector<const StabilityEstimator*> estimatorsOf(const StabilityCase& c) const {
+    const Sets& named = m_options.quick && !c.quickEstimators.empty() ? c.quickEstimators
+                                                                      : c.estimators;
+    std::vector<const StabilityEstimator*> out;
+    for (const StabilityEstimator& e : m_catalogue.estimators) {
+      const bool taken = named.empty() ? e.always
+                                       : std::find(named.begin(), named.end(), e.name) != named.end();
+      const bool asked =
+          m_options.estimators.empty() ||
+          std::find(m_options.estimators.begin(), m_options.estimators.end(), e.name) !=
+              m_options.estimators.end();
+      if (taken && asked) out.push_back(&e);
+    }
+    return out;
+  }
+
+  StabilityRow rowOf(const StabilityCase& c, const std::string& estimator) const {
+    StabilityRow row;
+    row.name = c.name;
+    row.estimator = estimator;
+    row.hard = c.hard;
+    row.oracle = c.oracle.source.empty() ? c.oracle.kind : c.oracle.source;
+    row.bound = m_options.quick ? c.quickBound : c.bound;
+    return row;
+  }
+
+  void finish(StabilityRow row) {
+    if (m_each) m_each(row);
+    m_rows.push_back(std::move(row));
+  }
+
+  // The smoke of a spec, made when first asked for.
+  std::string smokeFile(SmokeSpec spec) {
+    // Sizes that only the full table has.
+    for (const char* name : {"points", "voxels"}) {
+      const std::string full = std::string("full_") + name;
+      if (!m_options.quick && spec.numbers.contains(full)) spec.numbers[name] = spec.numbers[full];
+      spec.numbers.erase(full);
+    }
+    Hasher hasher;
+    hasher.text(spec.key());
+    const fs::path path = m_folder.path() / (hasher.hex() + ".vdb");
+    if (fs::exists(path)) return path.string();
+    const ChildResult made = runInChild([&] {
+      writeStabilitySmoke(spec, path);
+      return std::string();
+    });
+    if (made.failed) throw Error(made.code, "smoke for a hard case: " + made.message);
+    return path.string();
+  }
+
+  // The base scene over a smoke, with settings; `$smoke` stands for the file.
+  scene::SceneFile sceneWith(const std::string& smoke, Sets sets) const {
+    for (std::string& set : sets)
+      for (std::size_t at = set.find("$smoke"); at != std::string::npos; at = set.find("$smoke"))
+        set.replace(at, 6, smoke);
+    sets.insert(sets.begin(), fmt::format("volume.0.file=\"{}\"", smoke));
+    return scene::parseScene(m_catalogue.scene, (m_catalogue.folder / "base.toml").string(),
+                             m_catalogue.folder, sets);
+  }
+
+  StabilityFrameJob jobOf(const StabilityCase& c, const SmokeSpec& smoke, const Sets& sets,
+                          int lamps) {
+    StabilityFrameJob job;
+    job.scene = sceneWith(smokeFile(smoke), sets);
+    job.scene.allowInvalid = c.allowInvalid;
+    shareLight(job.scene, lamps);
+    if (c.crop.size() == 4)
+      job.request.crop = render::Crop{{c.crop[0], c.crop[1]}, {c.crop[2], c.crop[3]}};
+    job.layer = c.layer;
+    job.cpuLimit = m_options.quick ? kQuickCpuLimit : kCpuLimit;
+    return job;
+  }
+
+  static void makeFiner(scene::SceneFile& scene) {
+    for (const char* key : {"photons", "samples", "final_gather"})
+      scene.estimator.set(key, scene.estimator.integer(key) * kFiner, "finer");
+    scene.render.set("samples", scene.render.integer("samples") * kFiner, "finer");
+    scene.scene.set("seed", scene.scene.integer("seed") + 1, "finer");
+  }
+
+  // What the frame is held against, rendered once for all that ask for the same.
+  const StabilityFrame& reference(const StabilityCase& c, const StabilityEstimator& e) {
+    const StabilityOracle& o = c.oracle;
+    Sets sets;
+    if (o.kind != "same" || !o.bare) sets = c.set;
+    if (o.kind == "path") {
+      append(sets, e.truth);
+      append(sets, {"estimator.type=\"path_traced\"", "scene.seed=77",
+                    fmt::format("estimator.samples={}", o.samples > 0 ? o.samples : 2048)});
+    } else {
+      append(sets, e.set);
+    }
+    append(sets, o.set);
+    const SmokeSpec& smoke = o.ownSmoke ? o.smoke : c.smoke;
+    std::string key = o.kind + smoke.key();
+    for (const std::string& set : sets)
+      key += "\n" + set;
+    const auto known = m_frames.find(key);
+    if (known != m_frames.end()) return known->second;
+    StabilityFrameJob job = jobOf(c, smoke, sets, o.kind == "same" ? 0 : c.lights);
+    if (o.kind == "finer") makeFiner(job.scene);
+    job.cpuLimit *= kFiner;
+    return m_frames.emplace(key, renderStabilityFrame(job)).first->second;
+  }
+
+  void runFrame(const StabilityCase& c, const StabilityEstimator& e) {
+    StabilityRow row = rowOf(c, e.name);
+    try {
+      Sets sets = c.set;
+      append(sets, e.set);
+      StabilityFrameJob job = jobOf(c, c.smoke, sets, c.lights);
+      job.seeds = c.seeds;
+      job.writes = c.writes;
+      job.exr = m_folder.path() / "frame.exr";
+      const StabilityFrame frame = renderStabilityFrame(job);
+      row.seconds = frame.seconds;
+      row.nanSamples = frame.nanSamples;
+      row.negativeSamples = frame.negativeSamples;
+      row.cappedPower = frame.cappedShare;
+      judge(c, e, frame, row);
+    } catch (const InterruptedError&) {
+      throw;
+    } catch (const ConfigError& error) {
+      // Scenes are read here: what they say wrong may be what is asked for.
+      StabilityFrame refused;
+      refused.failed = true;
+      refused.code = error.code();
+      refused.message = error.what();
+      judge(c, e, refused, row);
+    }
+    finish(std::move(row));
+  }
+
+  void judge(const StabilityCase& c, const StabilityEstimator& e, const StabilityFrame& frame,
+             StabilityRow& row) {
+    if (c.oracle.kind == "error") return judgeError(c, frame, row);
+    if (frame.failed) {
+      row.message = frame.message;
+      row.error = std::numeric_limits<double>::infinity();
+      return;
+    }
+    row.result = numberText(meanOf(frame));
+    if (c.oracle.kind == "zero") {
+      row.expected = "0";
+      row.error = std::any_of(frame.pixels.begin(), frame.pixels.end(),
+                              [](double v) { return v != 0; })
+                      ? 1
+                      : 0;
+    } else if (c.oracle.kind == "below") {
+      row.expected = fmt::format("< {:g}", c.oracle.value);
+      for (const double v : frame.pixels)
+        row.error = std::isfinite(v) ? std::max(row.error, std::abs(v) / c.oracle.value)
+                                     : std::numeric_limits<double>::infinity();
+    } else if (c.oracle.kind == "value") {
+      StabilityFrame flat = frame;
+      std::fill(flat.pixels.begin(), flat.pixels.end(), c.oracle.value);
+      hold(c, frame, flat, row);
+    } else if (c.oracle.kind == "finer" || c.oracle.kind == "path" || c.oracle.kind == "same") {
+      const StabilityFrame& other = reference(c, e);
+      if (other.failed) {
+        row.message = "what it is held against failed: " + other.message;
+        return;
+      }
+      hold(c, frame, other, row);
+    } else {
+      throw ConfigError(fmt::format("{}: no oracle is of kind '{}'", c.name, c.oracle.kind));
+    }
+    row.passed = row.error <= row.bound && frame.nanSamples == 0 && frame.negativeSamples == 0;
+    judgeWords(c, frame, row);
+  }
+
+  // One more count against a row.
+  static void fail(StabilityRow& row, const std::string& why) {
+    row.passed = false;
+    row.message += (row.message.empty() ? "" : "; ") + why;
+  }
+
+  static void judgeWords(const StabilityCase& c, const StabilityFrame& frame, StabilityRow& row) {
+    if (frame.majorantViolations > 0)
+      fail(row, fmt::format("{} majorants exceeded", frame.majorantViolations));
+    if (!c.writes.empty() && frame.fileType != c.writes)
+      fail(row, fmt::format("the file holds {}, not {}", frame.fileType, c.writes));
+    if (frame.notes.find(c.says) == std::string::npos)
+      fail(row, fmt::format("no note says '{}', but: {}", c.says, frame.notes));
+  }
+
+  void hold(const StabilityCase& c, const StabilityFrame& frame, const StabilityFrame& other,
+            StabilityRow& row) const {
+    const double scale = c.oracle.scale;
+    row.expected = numberText(meanOf(other) * scale);
+    row.error = blockError(frame, other,
+                           c.metric == "mean" ? std::max(frame.width, frame.height) : c.block,
+                           scale);
+  }
+
+  static void judgeError(const StabilityCase& c, const StabilityFrame& frame, StabilityRow& row) {
+    row.expected = fmt::format("exit {}", c.oracle.code);
+    row.result = fmt::format("exit {}", static_cast<int>(frame.code));
+    row.message = frame.message;
+    row.passed = frame.failed && static_cast<int>(frame.code) == c.oracle.code &&
+                 frame.message.find(c.oracle.message) != std::string::npos;
+    row.error = row.passed ? 0 : 1;
+    if (!row.passed && frame.failed)
+      row.message += fmt::format(" (wanted: {})", c.oracle.message);
+  }
+
+  void runTrace(const StabilityCase& c) {
+    if (!m_options.estimators.empty()) return;
+    StabilityRow row = rowOf(c, "-");
+    runStabilityTrace(c, m_options.quick, row);
+    finish(std::move(row));
+  }
+
+  void runSlabRadiance(const StabilityCase& c) {
+    const std::vector<SlabRadiance> slabs =
+        slabRadiances(m_catalogue.folder, c.slab.number("g", 0), m_options.quick);
+    for (const StabilityEstimator* e : estimatorsOf(c))
+      for (const SlabRadiance& slab : slabs)
+        runSlab(c, *e, slab);
+  }
+
+  // The worst direction of one slab.
+  void runSlab(const StabilityCase& c, const StabilityEstimator& e, const SlabRadiance& slab) {
+    StabilityRow row = rowOf(c, e.name);
+    row.name = fmt::format("{}_tau{:g}_albedo{:g}", c.name, slab.tau, slab.albedo);
+    row.passed = true;
+    for (const SlabRadiance::Direction& d : slab.directions) {
+      Sets sets = c.set;
+      append(sets, slab.settings(d));
+      append(sets, e.set);
+      const StabilityFrame frame = renderStabilityFrame(jobOf(c, slab.smoke(), sets, 0));
+      row.seconds += frame.seconds;
+      row.nanSamples += frame.nanSamples;
+      row.negativeSamples += frame.negativeSamples;
+      if (frame.failed) return finish((fail(row, frame.message), row));
+      const double error = std::abs(meanOf(frame) / d.value - 1);
+      if (error < row.error && !row.result.empty()) continue;
+      row.error = error;
+      row.expected = numberText(d.value);
+      row.result = numberText(meanOf(frame));
+      row.message = fmt::format("worst at {} mu {:g}", d.top ? "the lit face," : "the far face,",
+                                d.mu);
+    }
+    row.passed = row.error <= row.bound && row.nanSamples + row.negativeSamples == 0;
+    finish(std::move(row));
+  }
+
+  const StabilityOptions& m_options;
+  const std::function<void(const StabilityRow&)>& m_each;
+  StabilityCatalogue m_catalogue;
+  RunFolder m_folder;
+  std::map<std::string, StabilityFrame> m_frames;  // of one case
+  std::vector<StabilityRow> m_rows;
+};
+
+}  // namespace
+
+std::vector<StabilityRow> runStability(const StabilityOptions& options,
+                                       const std::function<void(const StabilityRow&)>& each) {
+  return Table(options, each).run();
+}
+
+}  // namespace photosphere::study

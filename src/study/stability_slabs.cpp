@@ -1,0 +1,80 @@
+#include "stability_slabs.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <sstream>
+
+#include "photosphere/core/error.h"
+
+namespace photosphere::study {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+// Half the slab's width, beyond which its sides would show, and of what the camera sees [m].
+double halfWidth(double tau) {
+  return 4 * tau + 30;
+}
+constexpr double kSeen = 8;
+
+std::ifstream openTable(const fs::path& folder) {
+  for (const fs::path& path : {folder / "slab.csv", folder / "../../test/reference/slab.csv"})
+    if (std::ifstream in(path); in) return in;
+  throw InputMissingError((folder / "slab.csv").string(), "is missing, which the slabs need");
+}
+
+}  // namespace
+
+SmokeSpec SlabRadiance::smoke() const {
+  // Eight light voxels deep or more, and no deeper than a quarter of a free path each.
+  const double layers = std::max(16.0, std::ceil(tau / 0.25));
+  SmokeSpec spec;
+  spec.texts["kind"] = "box";
+  spec.numbers["dims"] = {8, 8, layers};
+  spec.numbers["extent"] = {2 * halfWidth(tau), 2 * halfWidth(tau), tau};
+  spec.numbers["points"] = {0};
+  return spec;
+}
+
+std::vector<std::string> SlabRadiance::settings(const Direction& d) const {
+  const double s = std::sqrt(std::max(0.0, 1 - d.mu * d.mu)), side = d.top ? 1 : -1;
+  const double far = 4 * halfWidth(tau);
+  return {"volume.0.density_scale=1",
+          fmt::format("volume.0.albedo={}", albedo),
+          fmt::format("volume.0.phase={{ type = \"henyey_greenstein\", g = {} }}", g),
+          "light=[{ type = \"directional\", position = [0, 0, 1], target = [0, 0, 0] }]",
+          fmt::format("camera={{ type = \"orthographic\", position = [{}, 0, {}], look_at = [0, 0, "
+                      "0], up = [0, 1, 0], width = {}, resolution = [8, 8] }}",
+                      s * far, side * d.mu * far, 2 * kSeen)};
+}
+
+std::vector<SlabRadiance> slabRadiances(const fs::path& folder, double g, bool quick) {
+  std::ifstream in = openTable(folder);
+  std::vector<SlabRadiance> slabs;
+  std::string line;
+  std::getline(in, line);
+  while (std::getline(in, line)) {
+    std::stringstream fields(line);
+    std::string f[7];
+    for (std::string& field : f)
+      std::getline(fields, field, ',');
+    const bool top = f[4] == "L_top";
+    if (f[0] != "beam" || (!top && f[4] != "L_bottom") || std::stod(f[3]) != g) continue;
+    const double tau = std::stod(f[1]), albedo = std::stod(f[2]), mu = std::stod(f[5]);
+    if (tau > 8 || mu < 0.3) continue;
+    if (quick && (tau != 2 || albedo == 0.99 || (mu != 0.3 && mu != 0.6 && mu != 1))) continue;
+    const auto same = [&](const SlabRadiance& slab) {
+      return slab.tau == tau && slab.albedo == albedo;
+    };
+    auto slab = std::find_if(slabs.begin(), slabs.end(), same);
+    if (slab == slabs.end()) slab = slabs.insert(slabs.end(), {tau, albedo, g, {}});
+    slab->directions.push_back({top, mu, std::stod(f[6])});
+  }
+  return slabs;
+}
+
+}  // namespace photosphere::study

@@ -1,0 +1,33 @@
+#pragma once
+// Radiance that leaves plane-parallel slabs, against the reference values of slab.csv.
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "stability_catalogue.h"
+
+namespace photosphere::study {
+
+/// One slab under a beam, and what is known of the light that leaves it.
+struct SlabRadiance {
+  struct Direction {
+    bool top = true;  ///< leaves the lit face; else the far one
+    double mu = 1;    ///< |cosine| to the normal
+    double value = 0;  ///< scattered radiance per unit irradiance [1/sr]
+  };
+  double tau = 0, albedo = 0, g = 0;
+  std::vector<Direction> directions;
+
+  /// A slab of extinction 1 in z = -tau/2 .. tau/2, faded out over one voxel: radiance depends on
+  /// the optical depth alone.
+  SmokeSpec smoke() const;
+  /// Settings over the base scene: medium, lamp, a camera of parallel rays.
+  std::vector<std::string> settings(const Direction& direction) const;
+};
+
+/// Slabs of `g` with tau <= 8 and their directions of mu >= 0.3. @param quick  tau 2, three mu
+/// @throws InputMissingError when slab.csv is neither in the folder nor in the source tree
+std::vector<SlabRadiance> slabRadiances(const std::filesystem::path& folder, double g, bool quick);
+
+}  // namespace photosphere::study

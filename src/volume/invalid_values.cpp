@@ -1,0 +1,97 @@
+#include "photosphere/volume/invalid_values.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "openvdb_grid.h"
+#include "photosphere/core/error.h"
+
+namespace photosphere::volume {
+
+namespace {
+
+// Largest magnitude that stays finite as float, whatever is rounded.
+constexpr double kLargest = 3e38;
+
+enum class Fault { none, negative, infinite, nan };
+
+Fault faultOf(double v, bool negatives) {
+  if (std::isnan(v)) return Fault::nan;
+  if (!(std::abs(v) <= kLargest)) return Fault::infinite;
+  return negatives && v < 0 ? Fault::negative : Fault::none;
+}
+
+// The worst component's, and which value it is.
+template <class Value>
+Fault worstFault(const Value& value, bool negatives, double& bad) {
+  if constexpr (openvdb::VecTraits<Value>::IsVec) {
+    Fault worst = Fault::none;
+    for (int c = 0; c < 3; ++c) {
+      const auto v = static_cast<double>(value[c]);
+      if (const Fault fault = faultOf(v, negatives); fault > worst) {
+        worst = fault;
+        bad = v;
+      }
+    }
+    return worst;
+  } else {
+    bad = static_cast<double>(value);
+    return faultOf(bad, negatives);
+  }
+}
+
+template <class Visit>
+void visitValues(const Grid& grid, const Visit& visit) {
+  if (!grid) throw InputError("grid", "is missing");
+  if (!visitScalarGrid(*grid.base(), visit) && !visitVectorGrid(*grid.base(), visit))
+    throw InputError(describe(grid), "has no scalar or vector values");
+}
+
+}  // namespace
+
+std::string InvalidValues::text() const {
+  return fmt::format("{} NaN, {} infinite and {} negative values, the first ({}) at voxel ({}, {}, "
+                     "{})",
+                     nans, infinities, negatives, firstValue, first.x, first.y, first.z);
+}
+
+InvalidValues findInvalid(const Grid& grid, bool negatives) {
+  InvalidValues found;
+  visitValues(grid, [&](const auto& typed) {
+    for (auto it = typed.cbeginValueOn(); it; ++it) {
+      double bad = 0;
+      const Fault fault = worstFault(*it, negatives, bad);
+      if (fault == Fault::none) continue;
+      if (found.total() == 0) {
+        found.first = fromOpenVdb(it.getCoord());
+        found.firstValue = bad;
+      }
+      (fault == Fault::nan        ? found.nans
+       : fault == Fault::infinite ? found.infinities
+                                  : found.negatives) += it.getVoxelCount();
+    }
+  });
+  return found;
+}
+
+Grid withInvalidAsZero(const Grid& grid, bool negatives) {
+  if (!grid) throw InputError("grid", "is missing");
+  const openvdb::GridBase::Ptr copy = grid.base()->deepCopyGrid();
+  const auto clean = [negatives]<class GridT>(GridT& typed) {
+    using Value = typename GridT::ValueType;
+    for (auto it = typed.beginValueOn(); it; ++it) {
+      double bad = 0;
+      if (worstFault(Value(*it), negatives, bad) != Fault::none)
+        it.setValue(openvdb::zeroVal<Value>());
+    }
+  };
+  using Types = openvdb::TypeList<openvdb::FloatGrid, openvdb::DoubleGrid, openvdb::Int32Grid,
+                                  openvdb::Int64Grid, openvdb::BoolGrid, openvdb::Vec3SGrid,
+                                  openvdb::Vec3DGrid, openvdb::Vec3IGrid>;
+  if (!copy->apply<Types>(clean))
+    throw InputError(describe(grid), "has no scalar or vector values");
+  return Grid(copy);
+}
+
+}  // namespace photosphere::volume
