@@ -156,24 +156,21 @@ class FrameLoop {
   void pause() const {
     if (m_options.pause) m_options.pause([this](StateWriter& w) { keep(w); });
   }
-  void keep(StateWriter& w) const {
-    w.value(m_first);
-    w.value(m_row);
-    w.value(m_out.counters);
-    w.value(m_out.nanSamples);
-    w.value(m_out.negativeSamples);
-    w.value(m_out.firstBad);
-    w.values(m_sums);
+  // All that the bands so far have made.
+  template <class Loop, class State>
+  static void eachMember(Loop& loop, State& state) {
+    state(loop.m_first);
+    state(loop.m_row);
+    state(loop.m_out.counters);
+    state(loop.m_out.nanSamples);
+    state(loop.m_out.negativeSamples);
+    state(loop.m_out.firstBad);
+    state(loop.m_sums);
   }
+  void keep(StateWriter& w) const { eachMember(*this, w); }
   void resume(StateReader& r, Progress& progress) {
-    r.value(m_first);
-    r.value(m_row);
-    r.value(m_out.counters);
-    r.value(m_out.nanSamples);
-    r.value(m_out.negativeSamples);
-    r.value(m_out.firstBad);
     const std::size_t size = m_sums.size();
-    r.values(m_sums);
+    eachMember(*this, r);
     if (m_sums.size() != size || m_row < m_out.crop.min.y || m_row > m_out.crop.max.y) r.fail();
     const auto passes = static_cast<std::uint64_t>(m_first - m_options.firstSample);
     progress.add(passes * static_cast<std::uint64_t>(m_out.height()) +

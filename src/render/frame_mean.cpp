@@ -20,6 +20,21 @@ constexpr std::vector<Rgb> FrameLayers::*kColours[] = {
     &FrameLayers::beauty,   &FrameLayers::single,     &FrameLayers::multiple,
     &FrameLayers::emission, &FrameLayers::background, &FrameLayers::transmittance};
 
+// What a sum of frames is made of.
+template <class Layers, class State>
+void eachMember(Layers& layers, State& state) {
+  state(layers.crop);
+  state(layers.resolution);
+  for (const auto layer : kColours)
+    state(layers.*layer);
+  state(layers.alpha);
+  state(layers.depth);
+  state(layers.nanSamples);
+  state(layers.negativeSamples);
+  state(layers.firstBad);
+  state(layers.counters);
+}
+
 }  // namespace
 
 void FrameMean::add(const FrameLayers& frame) {
@@ -55,30 +70,12 @@ FrameLayers FrameMean::mean() const {
 
 void FrameMean::keep(StateWriter& w) const {
   w.value(m_count);
-  w.value(m_sum.crop);
-  w.value(m_sum.resolution);
-  for (const auto layer : kColours)
-    w.values(m_sum.*layer);
-  w.values(m_sum.alpha);
-  w.values(m_sum.depth);
-  w.value(m_sum.nanSamples);
-  w.value(m_sum.negativeSamples);
-  w.value(m_sum.firstBad);
-  w.value(m_sum.counters);
+  eachMember(m_sum, w);
 }
 
 void FrameMean::resume(StateReader& r) {
   r.value(m_count);
-  r.value(m_sum.crop);
-  r.value(m_sum.resolution);
-  for (const auto layer : kColours)
-    r.values(m_sum.*layer);
-  r.values(m_sum.alpha);
-  r.values(m_sum.depth);
-  r.value(m_sum.nanSamples);
-  r.value(m_sum.negativeSamples);
-  r.value(m_sum.firstBad);
-  r.value(m_sum.counters);
+  eachMember(m_sum, r);
 }
 
 }  // namespace photosphere::render

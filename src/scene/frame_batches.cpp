@@ -19,19 +19,19 @@ constexpr double kSettled = 0.1;
 constexpr const char* kPart = "frame";  // of the checkpoint
 
 // What batches add up.
-template <class Statistics, class Visit>
-void eachNumber(Statistics& s, const Visit& visit) {
-  visit(s.seconds);
-  visit(s.photonsEmitted);
-  visit(s.photonsScattered);
-  visit(s.photonsStored);
-  visit(s.photonsCapped);
-  visit(s.lightMemoryBytes);
+template <class Statistics, class State>
+void eachNumber(Statistics& s, State& state) {
+  state(s.seconds);
+  state(s.photonsEmitted);
+  state(s.photonsScattered);
+  state(s.photonsStored);
+  state(s.photonsCapped);
+  state(s.lightMemoryBytes);
   for (auto* power : {&s.energyEmitted, &s.energyMissed, &s.energyAbsorbed, &s.energyEscaped,
                       &s.energyCapped, &s.energyError})
-    visit(*power);
-  visit(s.majorantViolations);
-  visit(s.clampedLight);
+    state(*power);
+  state(s.majorantViolations);
+  state(s.clampedLight);
 }
 
 // The frame in independent batches, each of photons, samples and random numbers of its own, until
@@ -158,7 +158,7 @@ class FrameLoop {
     w.value(m_batches);
     w.value(m_pass);
     w.value(m_secondsBefore + m_watch.seconds());
-    eachNumber(m_statisticsBefore, [&](const auto& v) { w.value(v); });
+    eachNumber(m_statisticsBefore, w);
     w.value(m_estimate);
     w.text(m_result.layout);
     w.value(m_result.radius);
@@ -176,7 +176,7 @@ class FrameLoop {
     kept->value(m_batches);
     kept->value(m_pass);
     kept->value(m_secondsBefore);
-    eachNumber(m_result.statistics, [&](auto& v) { kept->value(v); });
+    eachNumber(m_result.statistics, *kept);
     kept->value(m_estimate);
     m_result.layout = kept->text();
     kept->value(m_result.radius);

@@ -34,6 +34,17 @@ class StateWriter {
     value(static_cast<std::uint64_t>(s.size()));
     put(s.data(), s.size());
   }
+  /// Any of them, so that one list of members serves writing and reading.
+  template <class T>
+  void operator()(const T& v) {
+    if constexpr (requires {
+                    typename T::value_type;
+                    v.data();
+                  })
+      values(v);
+    else
+      value(v);
+  }
 
  protected:
   virtual void put(const void* data, std::size_t size) = 0;
@@ -63,6 +74,16 @@ class StateReader {
     get(v.data(), count, sizeof(T));
   }
   std::string text();
+  template <class T>
+  void operator()(T& v) {
+    if constexpr (requires {
+                    typename T::value_type;
+                    v.data();
+                  })
+      values(v);
+    else
+      value(v);
+  }
   bool atEnd() const { return m_left == 0; }
   [[noreturn]] void fail() const;
 
