@@ -20,6 +20,8 @@ constexpr float kOpaque = 1e-5f;
 // part of the user's.
 constexpr float kStepDepth = 0.5f;
 constexpr float kFinest = 1.0f / 16.0f;
+// Parts of distances below which they are not told apart.
+constexpr float kResolution = 0x1p-21f;
 
 float exponential(float x) {
   return fastExp(x);
@@ -60,6 +62,7 @@ class MarchIntegrator final : public Integrator {
     if (m_emission)
       m_step = std::min(m_step, static_cast<float>(m_emission->region().spacing) * options.step);
     m_stepsPerLength = 1.0f / m_step;
+    m_thick = kStepDepth / (m_step * kFinest);
     if (source && options.gatherRays > 0)
       m_gather.emplace(medium,
                        DirectLight(medium, lights, shadows, true, source->carriesUnscattered()),
@@ -102,6 +105,14 @@ class MarchIntegrator final : public Integrator {
          !walk.done(); walk.advance()) {
       if (!(walk.majorant() > 0.0f) && !(m_emission && m_emission->inCell(walk.cell()))) continue;
       const float end = walk.end();
+      if (walk.majorant() > m_thick) {
+        const MarchStep rest{ray, std::max(done, walk.begin()), end};
+        if (!marchThick(rest, walk.majorant(), extinction, when, transmittance, opacity, result,
+                        rng, counters))
+          return Light(0.0f);
+        done = std::max(done, end);
+        continue;
+      }
       // The source inside a step varies by the extinction of the light on its way in, which the
       // midpoint rule sees to (depth)^2 / 24: dense smoke takes finer steps, in powers of two of
       // one lattice.
@@ -135,6 +146,32 @@ class MarchIntegrator final : public Integrator {
       done = std::max(done, t0);
     }
     return transmittance;
+  }
+
+  // A cell where the finest steps of the lattice would be too coarse: each step is as long as keeps
+  // its own depth small. @return false when the ray has ended dark
+  template <class Along>
+  bool marchThick(const MarchStep& cell, float majorant, const Along& extinction, When when,
+                  Light& transmittance, RayOpacity* opacity, RayRadiance& result, Rng& rng,
+                  IntegratorCounters& counters) const {
+    const float slope = majorant * m_medium.steepness();
+    for (float t0 = cell.t0; t0 < cell.t1;) {
+      Vec3f carrier(0.0f);
+      const float here = extinctionAt(extinction, cell.ray, t0, when, carrier);
+      const float part = std::min(m_step, transport::thinPart(here, slope, kStepDepth));
+      const float t1 = std::min(t0 + std::max(part, kResolution * t0), cell.t1);
+      const float middle = 0.5f * (t0 + t1);
+      const float sigma = extinctionAt(extinction, cell.ray, middle, when, carrier);
+      if (sigma > 0.0f)
+        transmittance = step({cell.ray, t0, t1}, sigma, carrier, when, transmittance, opacity,
+                             result, rng, counters);
+      else if (m_emission)
+        result.emission += transmittance * (t1 - t0) *
+                           m_medium.emitted(cell.ray.origin + cell.ray.direction * middle, when);
+      if (transport::largestOf(transmittance) < kOpaque) return false;
+      t0 = t1;
+    }
+    return true;
   }
 
   template <class Along>
@@ -195,6 +232,7 @@ class MarchIntegrator final : public Integrator {
   const transport::Emission* m_emission;  // nullptr where there is none
   float m_step;                           // [m]
   float m_stepsPerLength;                 // its inverse
+  float m_thick;                          // extinction from where on steps choose their length
   std::optional<FinalGather> m_gather;
 };
 

@@ -25,6 +25,9 @@ bool besideSmoke(const transport::SupportLattice& lattice, const Vec3i& node) {
 // Times of the shutter at which grids are made: about one for each voxel that the smoke moves.
 constexpr double kMostTimes = 9;
 
+// Optical depth of one voxel from where on its own shadow is lost between the nodes of a grid.
+constexpr double kThickVoxel = 4;
+
 float attenuated(float depth) {
   return fastExp(-depth);
 }
@@ -38,6 +41,15 @@ Shadows::Shadows(const Medium& medium, const transport::LightList& lights, Shado
                  float step, std::uint64_t budgetBytes)
     : m_medium(&medium), m_mode(mode), m_step(step), m_tabulated(lights.size()) {
   if (mode != ShadowMode::grid || medium.bounds().empty()) return;
+  if (const double depth = static_cast<double>(medium.majorants().maximum()) * medium.voxelEdge();
+      depth > kThickVoxel) {
+    log::info(
+        "a voxel of the smoke has an optical depth of {:.3g}: no grid holds its shadows, they "
+        "are tracked (render.shadow = \"track\")",
+        depth);
+    m_mode = ShadowMode::track;
+    return;
+  }
   if (medium.isMoving()) {
     const transport::Shutter& shutter = medium.shutter();
     const double moves = medium.displacement() / shutter.longest() * (shutter.close - shutter.open);

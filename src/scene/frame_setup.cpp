@@ -3,7 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <numeric>
+#include <tuple>
+#include <utility>
 
 #include "camera_setup.h"
 #include "effect_plan.h"
@@ -112,15 +116,45 @@ transport::VolumeMotion placeMotion(const VolumeSource& source, const lights::Lo
   return motion;
 }
 
+// Optical depth of one voxel from where on more of it shows nowhere: the eye sees 1 % of such a
+// voxel's edge deep, and of light that scatters without loss 1 / 10,000 passes. Beyond, distances
+// between collisions would be lost in the rounding of positions, and extinction in the range of a
+// float.
+constexpr double kMostVoxelDepth = 1e4;
+// Density scales that stay within a float's range times any density.
+constexpr double kPlainScale = 1e20;
+
+// Density with its scale where floats hold neither alone, and cut off where it is past measure.
+void placeDensity(const VolumeEntry& entry, const VolumeSource& source, const Mat4d& localFromIndex,
+                  std::uint64_t budget, transport::MediumVolume& placed,
+                  std::vector<std::string>& notes) {
+  setExtinction(entry, placed);
+  volume::ValueScale values;
+  if (placed.densityScale > kPlainScale ||
+      (placed.densityScale > 0 && placed.densityScale < 1 / kPlainScale))
+    values.factor = std::exchange(placed.densityScale, 1.0);
+  const double unit = placed.densityScale * volume::finestSpacing(localFromIndex);
+  if (source.densest * values.factor * unit > kMostVoxelDepth) {
+    values.most = kMostVoxelDepth / unit;
+    notes.push_back(
+        fmt::format("{}: grid '{}' holds densities up to {:.4g}, an optical depth of {:.3g} in one "
+                    "voxel; those "
+                    "beyond {:.0e} are taken as that, which looks the same",
+                    source.path, source.density.name(), source.densest,
+                    source.densest * values.factor * unit, kMostVoxelDepth));
+  }
+  placed.density = volume::bricksFromGrid(source.density, 0, source.path, false, budget, values);
+}
+
 transport::MediumVolume placeVolume(const VolumeEntry& entry, const VolumeSource& source,
-                                    const lights::LocalSpace& space, std::uint64_t budget) {
+                                    const lights::LocalSpace& space, std::uint64_t budget,
+                                    std::vector<std::string>& notes) {
   transport::MediumVolume placed;
   if (!source.density) return placed;
   placed.name = source.density.name();
-  placed.density = volume::bricksFromGrid(source.density, 0, source.path, false, budget);
-  placed.localFromNode = localFromWorld(space) * source.worldFromIndex(source.density) *
-                         nodeShift(placed.density.origin());
-  setExtinction(entry, placed);
+  const Mat4d localFromIndex = localFromWorld(space) * source.worldFromIndex(source.density);
+  placeDensity(entry, source, localFromIndex, budget, placed, notes);
+  placed.localFromNode = localFromIndex * nodeShift(placed.density.origin());
   placed.albedo = entry.values.rgb("albedo");
   if (source.albedo) {
     const int components = source.albedo.kind() == volume::GridKind::vector ? 3 : 1;
@@ -158,6 +192,38 @@ SceneFile sceneOfFrame(const SceneFile& written, std::int64_t frame, const Setup
   return scene;
 }
 
+// Particles that lie exactly where others do carry no light of their own: every photon in range of
+// one would be shared out to all of them, which takes as long as there are many. The first stays.
+void dropCoincident(FrameSetup& setup) {
+  std::vector<Vec3f>& particles = setup.particles;
+  std::vector<std::uint32_t> order(particles.size());
+  std::iota(order.begin(), order.end(), 0u);
+  // By bits, which have an order whatever they stand for.
+  const auto keyOf = [&](std::uint32_t i) {
+    const Vec3f& p = particles[i];
+    return std::tuple(std::bit_cast<std::uint32_t>(p.x), std::bit_cast<std::uint32_t>(p.y),
+                      std::bit_cast<std::uint32_t>(p.z), i);
+  };
+  std::sort(order.begin(), order.end(),
+            [&](std::uint32_t a, std::uint32_t b) { return keyOf(a) < keyOf(b); });
+  std::vector<bool> dropped(particles.size());
+  std::size_t count = 0;
+  for (std::size_t i = 1; i < order.size(); ++i)
+    if (particles[order[i]] == particles[order[i - 1]]) {
+      dropped[order[i]] = true;
+      ++count;
+    }
+  if (count == 0) return;
+  std::vector<Vec3f> kept;
+  kept.reserve(particles.size() - count);
+  for (std::size_t i = 0; i < particles.size(); ++i)
+    if (!dropped[i]) kept.push_back(particles[i]);
+  setup.notes.push_back(fmt::format(
+      "{} of {} particles lie exactly where others do; one of each place carries the light", count,
+      particles.size()));
+  particles = std::move(kept);
+}
+
 // Two passes: where the smoke is, then the smoke about its own centre.
 void buildMedium(const SceneFile& scene, std::int64_t cacheFrame, bool wantParticles,
                  FrameSetup& setup) {
@@ -186,7 +252,8 @@ void buildMedium(const SceneFile& scene, std::int64_t cacheFrame, bool wantParti
       setup.notes.push_back(fmt::format("{}: no smoke in it at this frame", sources[i].path));
       continue;
     }
-    placed.push_back(placeVolume(scene.volumes[i], sources[i], setup.space, setup.memoryBudget));
+    placed.push_back(
+        placeVolume(scene.volumes[i], sources[i], setup.space, setup.memoryBudget, setup.notes));
     if (sources[i].emission)
       placed.back().emission =
           placeEmission(scene.volumes[i], sources[i], localFromWorld(setup.space),
@@ -195,6 +262,7 @@ void buildMedium(const SceneFile& scene, std::int64_t cacheFrame, bool wantParti
         placeMotion(sources[i], setup.space, shutter, setup.memoryBudget, setup.notes);
     if (placed.back().density.empty() && placed.back().emission.field.empty()) placed.pop_back();
   }
+  dropCoincident(setup);
   setup.medium = std::make_unique<transport::Medium>(std::move(placed), shutter);
   // Active voxels may hold zeros: what frames the smoke is the box of what scatters or emits.
   setup.worldBounds = worldBoundsOf(*setup.medium, setup.space);
@@ -231,12 +299,23 @@ double carrierSpacing(const std::vector<Vec3f>& particles) {
 constexpr double kSharpLobe = 0.85;
 constexpr int kSharpRows = 4;  // fewer bins than 128 are dark there
 
-double sharpestLobe(const transport::Medium& medium) {
-  double sharpest = 0;
+// Smoke that has no wider lobes than these has nothing that bins could hold: each is lost in one,
+// whose light is then seen from where none goes.
+constexpr double kNeedle = 0.99;
+
+struct LobeRange {
+  double sharpest = 0, widest = 1;  // |g|
+};
+
+LobeRange lobesOf(const transport::Medium& medium) {
+  LobeRange range;
   for (const phase::PhaseFunction& phase : medium.phases())
-    for (int i = 0; i < phase.lobes(); ++i)
-      sharpest = std::max(sharpest, std::abs(phase.lobe(i).g()));
-  return sharpest;
+    for (int i = 0; i < phase.lobes(); ++i) {
+      const double g = std::abs(phase.lobe(i).g());
+      range.sharpest = std::max(range.sharpest, g);
+      range.widest = std::min(range.widest, g);
+    }
+  return range;
 }
 
 // Angle under which smoke sees the eye move from where it is in the middle of the shutter, up to
@@ -258,14 +337,19 @@ void heedParallax(const SceneFile& scene, FrameSetup& setup) {
              : "stored for the eye in the middle; estimator.basis = \"histogram\" serves all"));
 }
 
+// Radius of the kernel over fluence that the work grows with the third power of [light voxels].
+// Four are mush already (automaticRadius).
+constexpr int kMostVoxelsWide = 16;
+
 void buildLayout(const SceneFile& scene, const SetupOptions& options, FrameSetup& setup) {
   using namespace estimators;
   const ParamValues& e = scene.estimator;
   LightFieldLayout& l = setup.layout;
   const bool cached = options.forLightCache || !e.text("cache").empty();
   l = layoutOf(e, cached);
-  if (const double g = sharpestLobe(*setup.medium);
-      e.text("basis") == "auto" && l.basis == Basis::view && g >= kSharpLobe) {
+  const LobeRange lobes = lobesOf(*setup.medium);
+  if (const double g = lobes.sharpest; e.text("basis") == "auto" && l.basis == Basis::view &&
+                                       g >= kSharpLobe && lobes.widest < kNeedle) {
     l.basis = Basis::histogram;
     if (!e.given("rows")) l.rows = kSharpRows;
     if (e.text("type") == "photosphere")
@@ -299,6 +383,16 @@ void buildLayout(const SceneFile& scene, const SetupOptions& options, FrameSetup
       const double spacings = 3.0 * carrierSpacing(setup.particles);
       l.radius = l.holdsPower() && spacings > 0 ? spacings : std::max(l.radius, spacings);
     }
+  }
+  const double widest = kMostVoxelsWide * l.lightVoxel * setup.medium->voxelEdge();
+  if (e.text("type") == "photosphere" && !l.holdsPower() && l.radius > widest) {
+    setup.notes.push_back(
+        fmt::format("estimator.radius = {:.4g} spans {:.3g} light voxels; {} are the most that "
+                    "light is smoothed "
+                    "over, {:.4g} (raise estimator.light_voxel for more)",
+                    e.real("radius"), l.radius / (l.lightVoxel * setup.medium->voxelEdge()),
+                    kMostVoxelsWide, widest / setup.space.metersPerUnit));
+    l.radius = widest;
   }
   const double deposit = e.real("deposit_radius") * setup.space.metersPerUnit;
   l.depositRadius = deposit > 0 ? deposit : l.radius;

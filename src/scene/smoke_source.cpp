@@ -58,10 +58,11 @@ void checkAffine(const std::string& path, const Grid& grid) {
 
 // Invalid values end the frame, or become zero where the user allows that.
 // @param key  what the grid is used as
-void heedInvalid(const SceneFile& scene, std::string_view key, bool negatives, Grid& grid,
-                 VolumeSource& source) {
+// @return the largest value that stays
+double heedInvalid(const SceneFile& scene, std::string_view key, bool negatives, Grid& grid,
+                   VolumeSource& source) {
   const volume::InvalidValues found = volume::findInvalid(grid, negatives);
-  if (found.total() == 0) return;
+  if (found.total() == 0) return found.largest;
   if (!scene.allowInvalid)
     throw InputError(source.path,
                      fmt::format("grid '{}', used as {}, holds {}; clean the cache, or give "
@@ -70,6 +71,7 @@ void heedInvalid(const SceneFile& scene, std::string_view key, bool negatives, G
   source.notes.push_back(fmt::format("{}: grid '{}', used as {}: {}; all are treated as zero",
                                      source.path, grid.name(), key, found.text()));
   grid = volume::withInvalidAsZero(grid, negatives);
+  return found.largest;
 }
 
 // One set of all particles of a file; the attributes of the first system decide when there are
@@ -88,13 +90,14 @@ void heedSkipped(const SceneFile& scene, const volume::RasterizeResult& result, 
                  VolumeSource& source) {
   if (result.skipped == 0) return;
   const std::string what = fmt::format(
-      "{} of {} particles have a position, radius or mass that is negative or not finite, the first "
+      "{} of {} particles have a position, radius or mass that is negative or not finite, the "
+      "first "
       "is number {}",
       result.skipped, points, result.firstSkipped);
   if (!scene.allowInvalid)
-    throw InputError(source.path,
-                     fmt::format("{}; clean the cache, or give --allow-invalid to leave them out",
-                                 what));
+    throw InputError(
+        source.path,
+        fmt::format("{}; clean the cache, or give --allow-invalid to leave them out", what));
   source.notes.push_back(fmt::format("{}: {}; they are left out", source.path, what));
 }
 
@@ -199,11 +202,13 @@ VolumeSource readVolume(const SceneFile& scene, const VolumeEntry& entry, std::i
       throw InputError(source.path,
                        fmt::format("grid '{}' is of type {}; a density is one number a voxel",
                                    source.density.name(), source.density.valueType()));
-    heedInvalid(scene, "density", true, source.density, source);
     // A rasterized grid has its values at its nodes already.
     if (entry.values.flag("cell_centered")) source.indexShift = Vec3d(0.5);
   }
-  if (source.density) checkAffine(source.path, source.density);
+  if (source.density) {
+    checkAffine(source.path, source.density);
+    source.densest = heedInvalid(scene, "density", true, source.density, source);
+  }
   if (const std::string& name = entry.values.text("velocity");
       wishes.velocity && !name.empty() && !cache.grids.empty()) {
     source.velocity = findGrid(cache, "velocity", name);

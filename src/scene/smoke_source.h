@@ -29,6 +29,7 @@ CacheGrids readCacheGrids(const std::string& path);
 struct VolumeSource {
   std::string path;
   volume::Grid density;
+  double densest = 0;            ///< largest value of `density`
   volume::Grid albedo;           ///< empty handle = the scene's constant
   volume::Grid emission;         ///< of values or temperatures; empty handle = none
   volume::Grid velocity;         ///< as the file has it; empty handle = none

@@ -51,8 +51,8 @@ class Table {
   Table(const StabilityOptions& options, const std::function<void(const StabilityRow&)>& each)
       : m_options(options),
         m_each(each),
-        m_catalogue(readStabilityCatalogue(
-            options.catalogue.empty() ? shippedStabilityCatalogue() : options.catalogue)),
+        m_catalogue(readStabilityCatalogue(options.catalogue.empty() ? shippedStabilityCatalogue()
+                                                                     : options.catalogue)),
         m_folder(fs::temp_directory_path() / fmt::format("photosphere-hard-{}", getpid())) {
     checkNames();
   }
@@ -86,7 +86,8 @@ class Table {
                          [&](const StabilityEstimator& e) { return e.name == name; });
     };
     const auto refuse = [](const std::string& where, const std::string& name) {
-      throw ConfigError(fmt::format("{}: no estimator of the catalogue is named '{}'", where, name));
+      throw ConfigError(
+          fmt::format("{}: no estimator of the catalogue is named '{}'", where, name));
     };
     for (const std::string& name : m_options.estimators)
       if (!known(name)) refuse("--family", name);
@@ -101,16 +102,15 @@ class Table {
   }
 
   std::vector<const StabilityEstimator*> estimatorsOf(const StabilityCase& c) const {
-    const Sets& named = m_options.quick && !c.quickEstimators.empty() ? c.quickEstimators
-                                                                      : c.estimators;
+    const Sets& named =
+        m_options.quick && !c.quickEstimators.empty() ? c.quickEstimators : c.estimators;
     std::vector<const StabilityEstimator*> out;
     for (const StabilityEstimator& e : m_catalogue.estimators) {
-      const bool taken = named.empty() ? e.always
-                                       : std::find(named.begin(), named.end(), e.name) != named.end();
-      const bool asked =
-          m_options.estimators.empty() ||
-          std::find(m_options.estimators.begin(), m_options.estimators.end(), e.name) !=
-              m_options.estimators.end();
+      const bool taken =
+          named.empty() ? e.always : std::find(named.begin(), named.end(), e.name) != named.end();
+      const bool asked = m_options.estimators.empty() ||
+                         std::find(m_options.estimators.begin(), m_options.estimators.end(),
+                                   e.name) != m_options.estimators.end();
       if (taken && asked) out.push_back(&e);
     }
     return out;
@@ -245,10 +245,10 @@ class Table {
     row.result = numberText(meanOf(frame));
     if (c.oracle.kind == "zero") {
       row.expected = "0";
-      row.error = std::any_of(frame.pixels.begin(), frame.pixels.end(),
-                              [](double v) { return v != 0; })
-                      ? 1
-                      : 0;
+      row.error =
+          std::any_of(frame.pixels.begin(), frame.pixels.end(), [](double v) { return v != 0; })
+              ? 1
+              : 0;
     } else if (c.oracle.kind == "below") {
       row.expected = fmt::format("< {:g}", c.oracle.value);
       for (const double v : frame.pixels)
@@ -291,9 +291,8 @@ class Table {
             StabilityRow& row) const {
     const double scale = c.oracle.scale;
     row.expected = numberText(meanOf(other) * scale);
-    row.error = blockError(frame, other,
-                           c.metric == "mean" ? std::max(frame.width, frame.height) : c.block,
-                           scale);
+    row.error = blockError(
+        frame, other, c.metric == "mean" ? std::max(frame.width, frame.height) : c.block, scale);
   }
 
   static void judgeError(const StabilityCase& c, const StabilityFrame& frame, StabilityRow& row) {
@@ -303,8 +302,7 @@ class Table {
     row.passed = frame.failed && static_cast<int>(frame.code) == c.oracle.code &&
                  frame.message.find(c.oracle.message) != std::string::npos;
     row.error = row.passed ? 0 : 1;
-    if (!row.passed && frame.failed)
-      row.message += fmt::format(" (wanted: {})", c.oracle.message);
+    if (!row.passed && frame.failed) row.message += fmt::format(" (wanted: {})", c.oracle.message);
   }
 
   void runTrace(const StabilityCase& c) {
@@ -341,8 +339,8 @@ class Table {
       row.error = error;
       row.expected = numberText(d.value);
       row.result = numberText(meanOf(frame));
-      row.message = fmt::format("worst at {} mu {:g}", d.top ? "the lit face," : "the far face,",
-                                d.mu);
+      row.message =
+          fmt::format("worst at {} mu {:g}", d.top ? "the lit face," : "the far face,", d.mu);
     }
     row.passed = row.error <= row.bound && row.nanSamples + row.negativeSamples == 0;
     finish(std::move(row));

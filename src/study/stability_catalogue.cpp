@@ -2,11 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <toml++/toml.h>
 #include <algorithm>
 #include <cstdlib>
 #include <fstream>
 #include <sstream>
-#include <toml++/toml.h>
 
 #include "photosphere/core/error.h"
 
@@ -181,8 +181,8 @@ toml::table parse(const fs::path& path) {
   try {
     return toml::parse(readText(path), path.string());
   } catch (const toml::parse_error& error) {
-    throw ConfigError(fmt::format("{}:{}: {}", path.string(), error.source().begin.line,
-                                  error.description()));
+    throw ConfigError(
+        fmt::format("{}:{}: {}", path.string(), error.source().begin.line, error.description()));
   }
 }
 
@@ -263,14 +263,14 @@ fs::path shippedStabilityCatalogue() {
     places.push_back(fs::path(data) / "hard");
   std::error_code error;
   const fs::path executable = fs::read_symlink("/proc/self/exe", error);
-  if (!error)
-    places.push_back(executable.parent_path().parent_path() / "share/photosphere/hard");
+  if (!error) places.push_back(executable.parent_path().parent_path() / "share/photosphere/hard");
   places.push_back(fs::path(PHOTOSPHERE_DATA_DIR) / "hard");
   for (const fs::path& place : places)
     if (fs::is_regular_file(place / "base.toml", error)) return place;
-  throw InputMissingError("hard/base.toml",
-                          "the catalogue of hard cases that is shipped with this tool is not there; "
-                          "set PHOTOSPHERE_DATA to the folder that holds hard/");
+  throw InputMissingError(
+      "hard/base.toml",
+      "the catalogue of hard cases that is shipped with this tool is not there; "
+      "set PHOTOSPHERE_DATA to the folder that holds hard/");
 }
 
 }  // namespace photosphere::study

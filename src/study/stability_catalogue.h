@@ -43,8 +43,8 @@ struct StabilityCase {
   bool quick = true;                                     ///< in the small size, too
   std::string layer = "beauty";
   std::string metric = "blocks";
-  int block = 8;  ///< edge of the blocks [pixels]
-  int seeds = 1;  ///< frames whose mean is the result
+  int block = 8;   ///< edge of the blocks [pixels]
+  int seeds = 1;   ///< frames whose mean is the result
   int lights = 0;  ///< lamps that share the base's light; 0 = as the scene has
   bool allowInvalid = false;
   std::vector<int> crop;

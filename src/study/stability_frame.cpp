@@ -31,10 +31,12 @@ std::string writtenType(scene::FrameResult& frame, const StabilityFrameJob& job)
   request.path = job.exr.string();
   scene::writeFrame(frame, job.scene, request);
   const image::ExrFile file = image::readExr(job.exr);
-  const bool isHalf = file.image.find("R")->kind == image::ChannelKind::color;
+  bool isHalf = true;  // what it could not hold would be infinite
   for (const char* name : {"R", "G", "B"})
-    for (const float v : file.image.channel(name))
+    for (const float v : file.image.channel(name)) {
       if (!std::isfinite(v)) return fmt::format("{} in channel {}", v, name);
+      isHalf = isHalf && std::abs(v) <= 65504.0f;
+    }
   return isHalf ? "half" : "float";
 }
 

@@ -15,8 +15,8 @@ struct StabilityFrameJob {
   scene::SceneFile scene;
   scene::RenderRequest request;
   std::string layer = "beauty";
-  int seeds = 1;         ///< frames of as many seeds, whose mean is wanted
-  std::string writes;    ///< not empty: the frame is written as EXR and read back
+  int seeds = 1;       ///< frames of as many seeds, whose mean is wanted
+  std::string writes;  ///< not empty: the frame is written as EXR and read back
   std::filesystem::path exr;
   double cpuLimit = 60;  ///< seconds of processor time, then the process is ended
 };

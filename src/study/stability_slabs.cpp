@@ -43,8 +43,7 @@ SmokeSpec SlabRadiance::smoke() const {
 std::vector<std::string> SlabRadiance::settings(const Direction& d) const {
   const double s = std::sqrt(std::max(0.0, 1 - d.mu * d.mu)), side = d.top ? 1 : -1;
   const double far = 4 * halfWidth(tau);
-  return {"volume.0.density_scale=1",
-          fmt::format("volume.0.albedo={}", albedo),
+  return {"volume.0.density_scale=1", fmt::format("volume.0.albedo={}", albedo),
           fmt::format("volume.0.phase={{ type = \"henyey_greenstein\", g = {} }}", g),
           "light=[{ type = \"directional\", position = [0, 0, 1], target = [0, 0, 0] }]",
           fmt::format("camera={{ type = \"orthographic\", position = [{}, 0, {}], look_at = [0, 0, "

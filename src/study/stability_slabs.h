@@ -12,8 +12,8 @@ namespace photosphere::study {
 /// One slab under a beam, and what is known of the light that leaves it.
 struct SlabRadiance {
   struct Direction {
-    bool top = true;  ///< leaves the lit face; else the far one
-    double mu = 1;    ///< |cosine| to the normal
+    bool top = true;   ///< leaves the lit face; else the far one
+    double mu = 1;     ///< |cosine| to the normal
     double value = 0;  ///< scattered radiance per unit irradiance [1/sr]
   };
   double tau = 0, albedo = 0, g = 0;

@@ -97,8 +97,8 @@ class Smoke {
     Box3d box;
     const Mat4d inverse = glm::inverse(l.worldFromIndex);
     for (int corner = 0; corner < 8; ++corner)
-      box.grow(transformPoint(inverse, Box3d{m_center - 0.5 * m_size, m_center + 0.5 * m_size}
-                                           .corner(corner)));
+      box.grow(transformPoint(
+          inverse, Box3d{m_center - 0.5 * m_size, m_center + 0.5 * m_size}.corner(corner)));
     l.first = Vec3i(glm::floor(box.min));
     l.count = Vec3i(glm::ceil(box.max)) - l.first + 1;
     return l;
@@ -115,14 +115,14 @@ class Smoke {
     if (m_kind == "tile")
       return volume::constantGrid("density", {l.first, l.first + l.count - 1},
                                   static_cast<float>(factor), l.fileFromIndex);
-    if (m_kind == "empty")
-      return volume::denseToGrid("density", Vec3i(1), {0.0f}, l.fileFromIndex);
+    if (m_kind == "empty") return volume::denseToGrid("density", Vec3i(1), {0.0f}, l.fileFromIndex);
     std::vector<float> values;
     for (int z = 0; z < l.count.z; ++z)
       for (int y = 0; y < l.count.y; ++y)
         for (int x = 0; x < l.count.x; ++x)
           values.push_back(static_cast<float>(
-              factor * densityAt(transformPoint(l.worldFromIndex, Vec3d(l.first + Vec3i(x, y, z))))));
+              factor *
+              densityAt(transformPoint(l.worldFromIndex, Vec3d(l.first + Vec3i(x, y, z))))));
     const Vec3i middle = l.count / 2;
     const std::vector<double> bad = m_spec.list("bad");
     for (std::size_t i = 0; i < bad.size(); ++i) {
@@ -136,7 +136,8 @@ class Smoke {
   }
 
   Grid density() const {
-    const Grid grid = volume::ofType(filled(m_spec.number("value", 1)), m_spec.text("type", "float"));
+    const Grid grid =
+        volume::ofType(filled(m_spec.number("value", 1)), m_spec.text("type", "float"));
     return m_spec.number("frustum", 0) > 0 ? volume::inFrustum(grid) : grid;
   }
 
@@ -160,7 +161,8 @@ class Smoke {
       const Vec3d q = Vec3d(static_cast<double>(u.x), static_cast<double>(u.y),
                             static_cast<double>(rng.uniform())) -
                       0.5;
-      const bool taken = static_cast<double>(rng.uniform()) < blobDensity(q) || m_kind == "box";
+      const bool taken = static_cast<double>(rng.uniform()) < blobDensity(q) || m_kind == "box" ||
+                         m_kind == "tile";
       if (!at.empty())
         set.positions.push_back(asVector(at, Vec3d(0.0)));
       else if (taken)

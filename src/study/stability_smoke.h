@@ -18,7 +18,8 @@ namespace photosphere::study {
 ///   the scene's `transform` does afterwards. The smoke stays where it is in the world
 /// - `type`: of the grid; `frustum` = 1
 /// - `flame`: factor of a grid `flame` of the same shape; `velocity`: of a grid `v`, everywhere
-/// - `points`, `at`, `pscale`, `bad_pscale`, `mass`: how many, all at one place, radii, those of the
+/// - `points`, `at`, `pscale`, `bad_pscale`, `mass`: how many, all at one place, radii, those of
+/// the
 ///   first ones, mass of all together
 ///
 /// @throws ConfigError for an unknown kind; OutputError

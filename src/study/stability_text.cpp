@@ -46,11 +46,11 @@ void writeStabilityCsv(const std::filesystem::path& path, const std::vector<Stab
       "case,estimator,hard,oracle,expected,result,error,bound,nan_samples,negative_samples,"
       "capped_power,seconds,passed,message\n";
   for (const StabilityRow& r : rows)
-    text += fmt::format("{},{},{},{},{},{},{:.6g},{:.6g},{},{},{:.6g},{:.3f},{},{}\n",
-                        quoted(r.name), quoted(r.estimator), quoted(r.hard), quoted(r.oracle),
-                        quoted(r.expected), quoted(r.result), r.error, r.bound, r.nanSamples,
-                        r.negativeSamples, r.cappedPower, r.seconds, r.passed ? "yes" : "no",
-                        quoted(r.message));
+    text +=
+        fmt::format("{},{},{},{},{},{},{:.6g},{:.6g},{},{},{:.6g},{:.3f},{},{}\n", quoted(r.name),
+                    quoted(r.estimator), quoted(r.hard), quoted(r.oracle), quoted(r.expected),
+                    quoted(r.result), r.error, r.bound, r.nanSamples, r.negativeSamples,
+                    r.cappedPower, r.seconds, r.passed ? "yes" : "no", quoted(r.message));
   writeFile(path, text);
 }
 

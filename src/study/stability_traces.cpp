@@ -90,8 +90,7 @@ struct LeaveSums final : transport::FlightSink {
 
 std::string fluxWork(const StabilityCase& c, std::uint64_t photons) {
   const double tau = c.slab.number("tau", 1);
-  const transport::Medium medium =
-      slab(tau, c.slab.number("albedo", 1), c.slab.number("g", 0));
+  const transport::Medium medium = slab(tau, c.slab.number("albedo", 1), c.slab.number("g", 0));
   LeaveSums sums;
   transport::TraceOptions options;
   options.photons = photons;
@@ -121,7 +120,8 @@ void runFlux(const StabilityCase& c, bool quick, StabilityRow& row) {
   const double g = c.slab.number("g", 0);
   const bool beam = c.slab.number("beam", 0) > 0;
   const double photons = c.slab.number(quick ? "quick_photons" : "photons", 1e5);
-  const ChildResult child = runInChild([&] { return fluxWork(c, static_cast<std::uint64_t>(photons)); });
+  const ChildResult child =
+      runInChild([&] { return fluxWork(c, static_cast<std::uint64_t>(photons)); });
   row.seconds = child.seconds;
   if (child.failed) {
     row.message = child.message;
@@ -159,8 +159,8 @@ double storedLight(double excess, std::uint64_t photons) {
   options.photons = photons;
   options.key = RandomKey::fromSeed(3, 0);
   transport::TraceStatistics statistics;
-  const estimators::LightField field = traceLightField(
-      medium, lampAt(1, false, excess), layout, estimators::View{}, {}, options, statistics);
+  const estimators::LightField field = traceLightField(medium, lampAt(1, false, excess), layout,
+                                                       estimators::View{}, {}, options, statistics);
   double sum = 0;
   for (const float value : field.values)
     sum += static_cast<double>(value);

@@ -13,7 +13,8 @@ namespace photosphere::study {
 ///
 /// - `slab_flux`: photons through a slab of `tau`, `albedo`, `g`, sent in from all directions (by
 ///   their cosine) or, with `beam` = 1, straight. Oracles: diffusion, T of (4/3) / ((1-g) tau +
-///   1.42); semi_infinite, R by Chandrasekhar's H function (albedo below 1, g = 0); conserved, R + T
+///   1.42); semi_infinite, R by Chandrasekhar's H function (albedo below 1, g = 0); conserved, R +
+///   T
 ///   + absorbed + capped = 1
 /// - `sums`: a lamp whose photons carry 2^`excess` times the power that it announces, so that a
 ///   thousand deposits weigh as much as any number. Oracles: counted, the light stored is in

@@ -42,6 +42,12 @@ bool isGrey(const Rgb& c) {
   return c.x == c.y && c.y == c.z;
 }
 
+// Nodes along each axis in a metre of any direction, summed over the axes.
+float steepnessOf(const Mat4d& localFromNode) {
+  const Mat3d nodes = glm::transpose(glm::inverse(Mat3d(localFromNode)));
+  return static_cast<float>(glm::length(nodes[0]) + glm::length(nodes[1]) + glm::length(nodes[2]));
+}
+
 }  // namespace
 
 Medium::Placed Medium::place(const volume::BrickField<float>& field, const Mat4d& localFromNode,
@@ -62,7 +68,10 @@ Medium::Medium(std::vector<MediumVolume> volumes, const Shutter& shutter)
     m_motions.push_back(
         {reach > 0 ? &v.motion.velocity : nullptr, volume::NodeFromLocal(v.motion.localFromNode)});
     sources.push_back({&v.density, v.localFromNode, v.densityScale, reach});
-    if (!v.density.empty()) edge = std::min(edge, volume::finestSpacing(v.localFromNode));
+    if (!v.density.empty()) {
+      edge = std::min(edge, volume::finestSpacing(v.localFromNode));
+      m_steepness = std::max(m_steepness, steepnessOf(v.localFromNode));
+    }
     if (!v.emission.field.empty()) {
       m_emitting.push_back(m_placed.size());
       emitting.push_back(&v.emission);

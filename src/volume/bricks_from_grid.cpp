@@ -115,12 +115,12 @@ using Supported = openvdb::TypeList<openvdb::BoolGrid, openvdb::FloatGrid, openv
 }  // namespace
 
 Field bricksFromGrid(const Grid& grid, int component, const std::string& path, bool allowNegative,
-                     std::uint64_t budgetBytes) {
+                     std::uint64_t budgetBytes, const ValueScale& scale) {
   Field field;
   const bool known = grid.base()->apply<Supported>([&](const auto& typed) {
     checkValues(typed, component, path, allowNegative);
     field = build<float>(typed, path, budgetBytes, [&](const auto& value) {
-      return static_cast<float>(componentOf(value, component));
+      return static_cast<float>(std::min(componentOf(value, component) * scale.factor, scale.most));
     });
   });
   if (!known)

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "openvdb_grid.h"
@@ -24,7 +25,7 @@ Fault faultOf(double v, bool negatives) {
 
 // The worst component's, and which value it is.
 template <class Value>
-Fault worstFault(const Value& value, bool negatives, double& bad) {
+Fault worstFault(const Value& value, bool negatives, double& bad, double& largest) {
   if constexpr (openvdb::VecTraits<Value>::IsVec) {
     Fault worst = Fault::none;
     for (int c = 0; c < 3; ++c) {
@@ -33,11 +34,14 @@ Fault worstFault(const Value& value, bool negatives, double& bad) {
         worst = fault;
         bad = v;
       }
+      if (worst == Fault::none) largest = std::max(largest, v);
     }
     return worst;
   } else {
     bad = static_cast<double>(value);
-    return faultOf(bad, negatives);
+    const Fault fault = faultOf(bad, negatives);
+    if (fault == Fault::none) largest = std::max(largest, bad);
+    return fault;
   }
 }
 
@@ -51,9 +55,10 @@ void visitValues(const Grid& grid, const Visit& visit) {
 }  // namespace
 
 std::string InvalidValues::text() const {
-  return fmt::format("{} NaN, {} infinite and {} negative values, the first ({}) at voxel ({}, {}, "
-                     "{})",
-                     nans, infinities, negatives, firstValue, first.x, first.y, first.z);
+  return fmt::format(
+      "{} NaN, {} infinite and {} negative values, the first ({}) at voxel ({}, {}, "
+      "{})",
+      nans, infinities, negatives, firstValue, first.x, first.y, first.z);
 }
 
 InvalidValues findInvalid(const Grid& grid, bool negatives) {
@@ -61,7 +66,7 @@ InvalidValues findInvalid(const Grid& grid, bool negatives) {
   visitValues(grid, [&](const auto& typed) {
     for (auto it = typed.cbeginValueOn(); it; ++it) {
       double bad = 0;
-      const Fault fault = worstFault(*it, negatives, bad);
+      const Fault fault = worstFault(*it, negatives, bad, found.largest);
       if (fault == Fault::none) continue;
       if (found.total() == 0) {
         found.first = fromOpenVdb(it.getCoord());
@@ -81,8 +86,8 @@ Grid withInvalidAsZero(const Grid& grid, bool negatives) {
   const auto clean = [negatives]<class GridT>(GridT& typed) {
     using Value = typename GridT::ValueType;
     for (auto it = typed.beginValueOn(); it; ++it) {
-      double bad = 0;
-      if (worstFault(Value(*it), negatives, bad) != Fault::none)
+      double bad = 0, largest = 0;
+      if (worstFault(Value(*it), negatives, bad, largest) != Fault::none)
         it.setValue(openvdb::zeroVal<Value>());
     }
   };

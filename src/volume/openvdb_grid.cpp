@@ -42,7 +42,9 @@ openvdb::math::Transform::Ptr makeTransform(const Mat4d& worldFromIndex) {
   try {
     return openvdb::math::Transform::createLinearTransform(toOpenVdb(worldFromIndex));
   } catch (const openvdb::Exception&) {
-    throw ConfigError("a grid's transform must have an inverse; this one flattens the volume");
+    throw ConfigError(
+        "a grid's transform must have an inverse; this one flattens the volume, or its voxels are "
+        "smaller than about 1e-5 scene units, which OpenVDB takes for flat: use larger units");
   }
 }
 

@@ -202,6 +202,23 @@ class Rasterizer {
 
 }  // namespace
 
+namespace {
+
+// A particle that is far larger than most would make voxels so large that the others vanish.
+void checkRadii(const RasterizeResult& result) {
+  // Its kernel in voxels of half the median radius would be 2^28 of them and more.
+  constexpr double kMostRatio = 200;
+  if (!(result.radiusMax > kMostRatio * result.radiusMedian) || !(result.radiusMedian > 0)) return;
+  throw MemoryError(fmt::format(
+      "the largest particle radius, {:.4g}, is {:.3g} times their median: voxels that fit the "
+      "others would take more than 1 GiB for that one alone. Clean the cache, or give one radius "
+      "for all (volume.particle_radius, convert --radius) or a larger voxel size (convert "
+      "--voxel-size)",
+      result.radiusMax, result.radiusMax / result.radiusMedian));
+}
+
+}  // namespace
+
 RasterizeResult rasterize(const ParticleSet& particles, const RasterizeOptions& options) {
   if (!(options.voxelSize >= 0) || !(options.radius >= 0) || !std::isfinite(options.voxelSize) ||
       !std::isfinite(options.radius))
@@ -210,6 +227,7 @@ RasterizeResult rasterize(const ParticleSet& particles, const RasterizeOptions& 
   initializeOpenVdb();
   RasterizeResult result;
   std::vector<Blob> blobs = collectBlobs(particles, options, result);
+  if (options.voxelSize == 0) checkRadii(result);
   result.voxelSize = chooseVoxelSize(blobs, options, result.radiusMedian);
   std::vector<Vec3d> positions;
   positions.reserve(2);

@@ -190,5 +190,37 @@ TEST_F(Study, RefusesWhatItCannotStudy) {
   EXPECT_NE(bare.err.find("gnuplot-nox"), std::string::npos) << bare.err;
 }
 
+TEST_F(Study, RunsTheTableOfHardCases) {
+  const RunResult good = runTool({"study", "--hard", "--quick", "--case", "density_invalid",
+                                  "--family", "single", "-o", "t.csv"},
+                                 m_folder.path());
+  EXPECT_EQ(good.exitCode, 0) << good.out << good.err;
+  EXPECT_NE(good.out.find("2 rows, 0 outside their bounds"), std::string::npos) << good.out;
+  EXPECT_NE(readText(m_folder / "t.csv").find("\"density_invalid_named\",\"single\""),
+            std::string::npos);
+}
+
+TEST_F(Study, ARowOutsideItsBoundIsExit7) {
+  fs::create_directories(m_folder / "hard/cases");
+  for (const char* name : {"base.toml", "estimators.toml"})
+    fs::copy_file(projectFile(std::string("data/hard/") + name), m_folder / "hard" / name);
+  writeText(m_folder / "hard/cases/a.toml",
+            "[[case]]\nname = \"a\"\nhard = \"b\"\nestimators = [\"single\"]\noracle = { kind = "
+            "\"zero\" }\n");
+  const RunResult bad =
+      runShell("PHOTOSPHERE_DATA=. '" PHOTOSPHERE_TOOL "' study --hard --quick", m_folder.path());
+  EXPECT_EQ(bad.exitCode, 7) << bad.out << bad.err;
+  EXPECT_NE(bad.out.find("FAILED a "), std::string::npos) << bad.out;
+}
+
+TEST_F(Study, TheHardTableTakesNoScene) {
+  EXPECT_EQ(study({"--hard"}).exitCode, 2);
+  EXPECT_EQ(runTool({"study", "--hard", "--paper"}, m_folder.path()).exitCode, 2);
+  EXPECT_EQ(runTool({"study", "--hard", "--frames", "1"}, m_folder.path()).exitCode, 2);
+  EXPECT_EQ(runTool({"study", "--hard", "--case", "nothing"}, m_folder.path()).exitCode, 2);
+  EXPECT_EQ(runTool({"study", kNastyName, "--case", "x", "-o", "r"}, m_folder.path()).exitCode, 2);
+  EXPECT_EQ(runTool({"study", kNastyName}, m_folder.path()).exitCode, 2);
+}
+
 }  // namespace
 }  // namespace photosphere::test

@@ -13,8 +13,8 @@ namespace photosphere::study {
 struct StabilityOptions {
   /// Folder of the catalogue; empty = data/hard beside the tool, or in the source tree.
   std::filesystem::path catalogue;
-  bool quick = false;              ///< small size, as continuous integration runs it
-  std::vector<std::string> cases;  ///< names, or beginnings of names; empty = all
+  bool quick = false;                   ///< small size, as continuous integration runs it
+  std::vector<std::string> cases;       ///< names, or beginnings of names; empty = all
   std::vector<std::string> estimators;  ///< only these; empty = all
 };
 

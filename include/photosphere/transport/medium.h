@@ -178,6 +178,10 @@ class Medium {
   const Box3d& bounds() const { return m_majorants.bounds(); }
   /// Smallest voxel edge of all densities [m]; of all emission where there is no density.
   double voxelEdge() const { return m_voxelEdge; }
+  /// How steep extinction can be along any direction, as a part of the largest node around [1/m]:
+  /// interpolated values change by no more than that from one voxel to the next. At the frame's own
+  /// time.
+  float steepness() const { return m_steepness; }
   /// True when every albedo and extinction has equal channels.
   bool isGrey() const { return m_grey; }
   /// Largest albedo of any channel where there is smoke.
@@ -248,6 +252,7 @@ class Medium {
   bool m_moving = false, m_coloured = false;
   volume::MajorantGrid m_majorants;
   double m_voxelEdge = 1.0;
+  float m_steepness = 0.0f;
   bool m_grey = true;
   bool m_uniformAlbedo = false;
   float m_maximumAlbedo = 0.0f;

@@ -47,6 +47,55 @@ struct Collision {
   bool happened() const { return distance < kInfinity; }
 };
 
+/// A length in which optical depth grows by at most `depth`, from where extinction is sigma and
+/// rises by no more than `slope` [1/m^2].
+inline float thinPart(float sigma, float slope, float depth) {
+  // (sigma + slope * part) * part = depth, solved without cancellation.
+  return 2.0f * depth / (sigma + std::sqrt(sigma * sigma + 4.0f * slope * depth));
+}
+
+/// A cell so thick that a walk past the edge of its smoke would draw many collisions that are none
+/// is walked in parts, each with a majorant of its own: extinction where the part begins, plus what
+/// it can rise by on the way (Medium::steepness). Their number grows with the root of the depth.
+/// @param t    where the walk is, inside the cell
+/// @param tau  optical depth to the next tentative collision, carried on from part to part
+/// @return false when `visit` did
+template <class Along, class Visit>
+inline bool walkThickCell(const Along& extinction, float t, float end, float majorant, float slope,
+                          float& tau, Rng& rng, TrackingCounters& counters, const Visit& visit) {
+  constexpr float kPartDepth = 2.0f;       // of a part that begins in thin smoke
+  constexpr float kWholeDepth = 16.0f;     // of one near the cell's own majorant
+  constexpr float kResolution = 0x1p-21f;  // of distances, as a part of them
+  while (t < end) {
+    const float sigma = extinction(t);
+    ++counters.lookups;
+    float part = kWholeDepth / majorant, bound = majorant;
+    if (sigma < 0.25f * majorant) {
+      part = glm::max(thinPart(sigma, slope, kPartDepth), kResolution * t);
+      bound = glm::min(majorant, (sigma + slope * part) * 1.0001f);
+    }
+    const float stop = glm::min(end, t + glm::max(part, kResolution * t));
+    while (true) {
+      const float available = (stop - t) * bound;
+      if (!(tau < available)) {
+        tau -= available;
+        break;
+      }
+      t += tau / bound;
+      const float here = extinction(t);
+      ++counters.lookups;
+      if (here > bound * 1.001f) ++counters.majorantViolations;
+      if (!visit(t, here, bound)) return false;
+      tau = -fastLog(rng.uniformPositive());
+    }
+    t = stop;
+  }
+  return true;
+}
+
+/// Depth of a voxel from where on its cell is walked in parts.
+inline constexpr float kThickVoxel = 16.0f;
+
 /// Calls visit(distance, sigma_t, majorant) for the tentative collisions of a ray, drawn against
 /// the local majorants in order, until it returns false: the walk that delta and ratio tracking
 /// share.
@@ -55,12 +104,20 @@ inline void forEachTentative(const Medium& medium, const Vec3f& o, const Vec3f& 
                              Rng& rng, TrackingCounters& counters, const Visit& visit,
                              When when = {}) {
   const auto extinction = medium.alongRay(o, d, when);
+  const float thick = kThickVoxel * medium.steepness();
   float tau = -fastLog(rng.uniformPositive());
   for (volume::MajorantGrid::Walk walk(medium.majorants(), o, d, 0.0f, length); !walk.done();
        walk.advance()) {
     const float majorant = walk.majorant();
     const float end = walk.end();
     float t = walk.begin();
+    if constexpr (std::is_same_v<When, Still>)
+      if (majorant > thick) {
+        if (!walkThickCell(extinction, t, end, majorant, majorant * medium.steepness(), tau, rng,
+                           counters, visit))
+          return;
+        continue;
+      }
     while (true) {
       const float available = (end - t) * majorant;
       if (!(tau < available)) {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <string>
 #include <type_traits>
@@ -179,6 +180,12 @@ void forEachCell(const BrickField<T>& field, const Visit& visit) {
       }
 }
 
+/// What a grid's values become as they are read.
+struct ValueScale {
+  double factor = 1.0;
+  double most = std::numeric_limits<double>::infinity();  ///< after `factor`; larger ones are cut
+};
+
 /// A scalar grid, or one component of a vector grid, as bricks. Inactive voxels count as zero.
 /// @param component  0 to 2 for a vector grid, 0 for a scalar grid
 /// @throws InputError when the grid is neither, or holds a NaN, infinite or (unless allowed)
@@ -186,7 +193,8 @@ void forEachCell(const BrickField<T>& field, const Visit& visit) {
 ///         value: it names the grid and the first such voxel; MemoryError when the table alone
 ///         would pass `budgetBytes` (0 = no budget)
 BrickField<float> bricksFromGrid(const Grid& grid, int component, const std::string& path,
-                                 bool allowNegative, std::uint64_t budgetBytes);
+                                 bool allowNegative, std::uint64_t budgetBytes,
+                                 const ValueScale& scale = {});
 
 /// A vec3s grid as bricks of (x, y, z, 0). Inactive voxels count as zero.
 /// @throws InputError for another type of grid and for a NaN or infinite value, naming the first

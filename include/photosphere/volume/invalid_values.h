@@ -16,6 +16,7 @@ struct InvalidValues {
   std::uint64_t negatives = 0;
   Vec3i first{0};         ///< index of the first of them, in the order of the tree
   double firstValue = 0;  ///< there
+  double largest = 0;     ///< of the values that are valid, by the largest component; 0 without any
 
   std::uint64_t total() const { return nans + infinities + negatives; }
   /// `2 NaN, 1 infinite and 0 negative values, the first (nan) at voxel (1, 2, 3)`.

@@ -38,7 +38,8 @@ struct RasterizeResult {
 /// set and the grid: about 56 bytes a particle and 16 a (particle, tile) pair, two pairs a particle
 /// where the voxel size is the default.
 /// @throws ConfigError for a negative option, or a voxel size so small that indices leave 30 bits;
-///   MemoryError when pairs and voxels would not fit 80 % of the memory that is free
+///   MemoryError when pairs and voxels would not fit 80 % of the memory that is free, or when the
+///   voxel size is to be chosen and a radius is more than 200 times the median
 RasterizeResult rasterize(const ParticleSet& particles, const RasterizeOptions& options);
 
 /// Median distance from a particle to its nearest other, over at most 20,000 particles spread

@@ -137,8 +137,9 @@ std::function<int()> declareConvert(CLI::App& app) {
                  "Particles seeded where the input has grids only; 0 = none [60000]")
       ->type_name("N");
   app.add_option("--seed", convert.seed, "Seed of the seeded particles [1]")->type_name("N");
-  app.add_flag("--allow-invalid", convert.allowInvalid,
-               "Write NaN, infinite and, in the density, negative values of grids as zero [exit 4]");
+  app.add_flag(
+      "--allow-invalid", convert.allowInvalid,
+      "Write NaN, infinite and, in the density, negative values of grids as zero [exit 4]");
   app.add_option("--format-option", options->formatOptions, "Option of a format, listed below")
       ->type_name("NAME=VALUE")
       ->allow_extra_args(false);

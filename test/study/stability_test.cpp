@@ -1,0 +1,134 @@
+// The table of hard cases: its catalogue, its oracles, its rows.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "photosphere/core/error.h"
+#include "photosphere/study/stability.h"
+#include "stability_catalogue.h"
+#include "stability_frame.h"
+#include "stability_traces.h"
+#include "support/slab_table.h"
+#include "support/support.h"
+
+namespace photosphere::study {
+namespace {
+
+using test::projectFile;
+using test::TemporaryFolder;
+using test::writeText;
+
+StabilityFrame frameOf(int width, int height, double value) {
+  StabilityFrame frame;
+  frame.width = width;
+  frame.height = height;
+  frame.pixels.assign(3 * static_cast<std::size_t>(width * height), value);
+  return frame;
+}
+
+// Copies the shipped scene and estimators beside other cases.
+void writeCatalogue(const TemporaryFolder& folder, const std::string& cases) {
+  std::filesystem::create_directories(folder / "cases");
+  for (const char* name : {"base.toml", "estimators.toml"})
+    writeText(folder / name, test::readText(projectFile(std::string("data/hard/") + name)));
+  writeText(folder / "cases/a.toml", cases);
+}
+
+std::string complaintAbout(const std::string& cases) {
+  const TemporaryFolder folder;
+  writeCatalogue(folder, cases);
+  try {
+    runStability({.catalogue = folder.path(), .quick = true}, {});
+  } catch (const ConfigError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(Stability, ErrorsOfBlocks) {
+  const StabilityFrame one = frameOf(16, 8, 1);
+  StabilityFrame other = frameOf(16, 8, 1.1);
+  EXPECT_NEAR(blockError(other, one, 8, 1), 0.1 / std::sqrt(1.01), 1e-12);
+  EXPECT_NEAR(blockError(other, one, 8, 1.1), 0, 1e-12);
+  // Noise within a block is none; one bright block is.
+  other = one;
+  other.pixels[0] += 0.5;
+  other.pixels[3] -= 0.5;
+  EXPECT_NEAR(blockError(other, one, 8, 1), 0, 1e-12);
+  other.pixels[0] += 64;
+  EXPECT_GT(blockError(other, one, 8, 1), 0.3);
+  other.pixels[0] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(blockError(other, one, 8, 1), std::numeric_limits<double>::infinity());
+  EXPECT_EQ(blockError(frameOf(8, 8, 1), one, 8, 1), std::numeric_limits<double>::infinity());
+  EXPECT_EQ(blockError(frameOf(8, 8, 0), frameOf(8, 8, 0), 8, 1), 0);
+  EXPECT_EQ(blockError(frameOf(8, 8, 1e-30), frameOf(8, 8, 0), 8, 1),
+            std::numeric_limits<double>::infinity());
+}
+
+TEST(Stability, SemiInfiniteReflectanceIsThatOfADeepSlab) {
+  for (const double albedo : {0.5, 0.9}) {
+    EXPECT_NEAR(semiInfiniteReflectance(albedo, false),
+                test::slabValue("diffuse", 32, albedo, 0, "R"), 1e-6);
+    EXPECT_NEAR(semiInfiniteReflectance(albedo, true), test::slabValue("beam", 32, albedo, 0, "R"),
+                1e-6);
+  }
+}
+
+TEST(Stability, TheCatalogueRefusesWhatItDoesNotKnow) {
+  const std::string head = "[[case]]\nname = \"a\"\nhard = \"b\"\n";
+  EXPECT_NE(
+      complaintAbout(head + "tau = 1\noracle = { kind = \"zero\" }\n").find("a.toml:4: unknown"),
+      std::string::npos);
+  EXPECT_NE(complaintAbout(head).find("'oracle' is missing"), std::string::npos);
+  EXPECT_NE(complaintAbout(head + "estimators = [\"vew\"]\noracle = { kind = \"zero\" }\n")
+                .find("no estimator of the catalogue is named 'vew'"),
+            std::string::npos);
+  EXPECT_NE(complaintAbout("[[row]]\nname = \"a\"\n").find("[[case]] tables alone"),
+            std::string::npos);
+}
+
+std::vector<StabilityRow> rowsOf(const std::string& cases) {
+  const TemporaryFolder folder;
+  writeCatalogue(folder, cases);
+  return runStability({.catalogue = folder.path(), .quick = true}, {});
+}
+
+// Every kind of oracle must be able to say no.
+TEST(Stability, RowsFailWhenTheAnswerIsAnother) {
+  const std::string one = "[[case]]\nhard = \"-\"\nestimators = [\"single\"]\n";
+  const auto rows =
+      rowsOf(one + "name = \"zero\"\noracle = { kind = \"zero\" }\n" + one +
+             "name = \"value\"\noracle = { kind = \"value\", value = 3 }\n" + one +
+             "name = \"same\"\noracle = { kind = \"same\", scale = 2 }\n" + one +
+             "name = \"path\"\noracle = { kind = \"path\", samples = 64, set = "
+             "[\"light.0.intensity=99\"] }\n" +
+             one + "name = \"error\"\noracle = { kind = \"error\", code = 4 }\n" + one +
+             "name = \"says\"\nsays = \"nothing of the kind\"\noracle = { kind = \"same\" }\n" +
+             one + "name = \"writes\"\nwrites = \"float\"\noracle = { kind = \"same\" }\n" + one +
+             "name = \"refused\"\nsmoke = { bad = -1 }\noracle = { kind = \"same\" }\n" +
+             "[[case]]\nhard = \"-\"\nname = \"flux\"\ntrace = \"slab_flux\"\nslab = { tau = 1, "
+             "photons = 1000, "
+             "quick_photons = 1000 }\noracle = { kind = \"diffusion\" }\nbound = 1e-9\n");
+  ASSERT_EQ(rows.size(), 9u);
+  for (const StabilityRow& row : rows)
+    EXPECT_FALSE(row.passed) << row.name;
+  EXPECT_NE(rows[7].message.find("holds 0 NaN, 0 infinite and 1 negative"), std::string::npos);
+}
+
+TEST(Stability, RowsPassWhenTheAnswerIsThat) {
+  const std::string one = "[[case]]\nhard = \"-\"\nestimators = [\"single\"]\nbound = 0.01\n";
+  const auto rows = rowsOf(
+      one + "name = \"zero\"\nset = [\"light.0.intensity=0\"]\noracle = { kind = \"zero\" }\n" +
+      one +
+      "name = \"{}\"\nfor = [\"1\", \"2\"]\nset = [\"light.0.intensity={}\"]\nwrites = \"half\"\n"
+      "oracle = { kind = \"same\", bare = true, scale = 0.05 }\n");
+  ASSERT_EQ(rows.size(), 3u);
+  EXPECT_TRUE(rows[0].passed) << rows[0].message;
+  EXPECT_TRUE(rows[1].passed) << rows[1].message;
+  EXPECT_FALSE(rows[2].passed);
+}
+
+}  // namespace
+}  // namespace photosphere::study
