@@ -47,7 +47,9 @@ class Damage : public testing::TestWithParam<Specimen> {
   /// Damages the whole at every place, in each of the ways in turn.
   Outcomes damage(const char* what, const std::vector<Change>& changes) {
     std::vector<std::size_t> places;
-    for (std::size_t at = 0; at < whole().size(); ++at)
+    // Without a limit of memory OpenVDB fills what it is told to.
+    const std::size_t step = test::kSanitized && target().isolated ? 7 : 1;
+    for (std::size_t at = 0; at < whole().size(); at += step)
       if (!insideZeros(at)) places.push_back(at);
     const std::size_t ways = changes.size();
     const Outcomes outcomes = attempt(
