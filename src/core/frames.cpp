@@ -6,7 +6,7 @@
 #include <charconv>
 #include <cstdlib>
 #include <filesystem>
-#include <unordered_set>
+#include <unordered_map>
 
 #include "photosphere/core/error.h"
 
@@ -68,9 +68,14 @@ Token findToken(std::string_view path) {
 
 // Keeps the first of equal frames, and the order.
 void dropRepeats(std::vector<std::int64_t>& frames) {
-  std::unordered_set<std::int64_t> seen;
-  seen.reserve(frames.size());
-  std::erase_if(frames, [&](std::int64_t frame) { return !seen.insert(frame).second; });
+  std::unordered_map<std::int64_t, std::uint64_t> seen;  // 64 neighbours in one
+  std::erase_if(frames, [&](std::int64_t frame) {
+    std::uint64_t& neighbours = seen[frame >> 6];
+    const std::uint64_t bit = std::uint64_t{1} << (frame & 63);
+    const bool repeated = (neighbours & bit) != 0;
+    neighbours |= bit;
+    return repeated;
+  });
 }
 
 }  // namespace

@@ -337,8 +337,8 @@ INSTANTIATE_TEST_SUITE_P(Commands, Disappearing,
                                            "$P trace scene.toml -o out/x.####.vdb",
                                            "$P convert smoke.####.vdb -o out/x.####.vdb "
                                            "--particles 500"),
-                         [](const auto& info) {
-                           const std::string command = info.param;
+                         [](const auto& test) {
+                           const std::string command = test.param;
                            return command.substr(3, command.find(' ', 3) - 3);
                          });
 

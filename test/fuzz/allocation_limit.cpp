@@ -42,7 +42,7 @@ void* limitedAllocation(std::size_t size) {
 
 }  // namespace photosphere::fuzz
 
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#if !defined(PHOTOSPHERE_SANITIZED)
 void* operator new(std::size_t size) {
   return photosphere::fuzz::limitedAllocation(size);
 }

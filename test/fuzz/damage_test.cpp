@@ -19,7 +19,8 @@ namespace {
 /// Where each byte is damaged one scene stands for those that are shipped, and one .vdb of a kind
 /// for the others: OpenVDB takes long for what it crashes over.
 std::vector<Specimen> damagedOnes() {
-  const std::set<std::string> chosen{"scene keyed", "vdb smoke_and_points", "light_cache voxels"};
+  const std::set<std::string> chosen{"scene keyed", "vdb smoke", "vdb smoke_and_points",
+                                     "light_cache voxels"};
   const std::set<std::string> choosy{"scene", "vdb", "light_cache"};
   std::vector<Specimen> all = specimens();
   std::erase_if(all, [&](const Specimen& specimen) {
@@ -31,8 +32,8 @@ std::vector<Specimen> damagedOnes() {
 /// Text cut between two numbers or lines is whole text, and every byte of one may be another
 /// letter.
 bool isText(const std::string& target) {
-  static const std::set<std::string> texts{"csv",   "xyz",       "pts",    "txt",  "tsv",   "asc",
-                                           "scene", "overrides", "frames", "chan", "detect"};
+  static const std::set<std::string> texts{"csv",    "pts",  "scene", "overrides",
+                                           "frames", "chan", "detect"};
   return texts.count(target) != 0;
 }
 
@@ -46,7 +47,9 @@ class Damage : public testing::TestWithParam<Specimen> {
   /// Damages the whole at every place, in each of the ways in turn.
   Outcomes damage(const char* what, const std::vector<Change>& changes) {
     std::vector<std::size_t> places;
-    for (std::size_t at = 0; at < whole().size(); ++at)
+    // Without a limit of memory OpenVDB fills what it is told to.
+    const std::size_t step = test::kSanitized && target().isolated ? 7 : 1;
+    for (std::size_t at = 0; at < whole().size(); at += step)
       if (!insideZeros(at)) places.push_back(at);
     const std::size_t ways = changes.size();
     const Outcomes outcomes = attempt(
@@ -60,6 +63,10 @@ class Damage : public testing::TestWithParam<Specimen> {
           return GetParam().target + ": " + what + ", byte " + std::to_string(places[i / ways]) +
                  ", way " + std::to_string(i % ways);
         });
+    // Of grids every length has been held against the tree before the library sees it.
+    if (GetParam().target == "vdb" && GetParam().name == "smoke") {
+      EXPECT_EQ(outcomes.guarded, 0);
+    }
     std::printf("%s: %d read, %d refused, %d ended by the guard\n", what, outcomes.read,
                 outcomes.refused, outcomes.guarded);
     return outcomes;

@@ -66,11 +66,9 @@ void addWritten(std::vector<Specimen>& all) {
   for (const caches::CacheFormat* format : caches::cacheFormats()) {
     if (!format->write || !format->read) continue;
     for (const std::string_view extension : format->extensions) {
-      const bool first = extension == format->extensions.front();
       std::string file = "a";
       file += extension;
-      const std::string target(first ? format->name : extension.substr(1));
-      all.push_back({target, "written", written(*format, file)});
+      all.push_back({targetOf(*format, extension), file.substr(2), written(*format, file)});
     }
     if (format->name == "ply")
       for (const char* encoding : {"ascii", "binary_big_endian"})
@@ -181,6 +179,8 @@ void addVolumes(std::vector<Specimen>& all) {
                    {{"note", "made to be damaged"}});
   for (const char* target : {"vdb", "vdb.walk"})
     all.push_back({target, "smoke_and_points", test::readText(folder / "a.vdb")});
+  volume::writeVdb(folder / "b.vdb", {someSmoke(), volume::renamed(someSmoke(), "again")});
+  all.push_back({"vdb", "smoke", test::readText(folder / "b.vdb")});
   all.push_back({"light_cache", "voxels", lightCache(estimators::Carrier::voxels)});
   all.push_back({"light_cache", "particles", lightCache(estimators::Carrier::particles)});
 }

@@ -133,9 +133,8 @@ void addCacheFormats(std::vector<Target>& all) {
     for (const std::string_view extension : format->extensions) {
       std::string file = "x_0001";
       file += extension;
-      // The first extension names the format; the others may be read another way.
-      const bool first = extension == format->extensions.front();
-      const std::string name(first ? format->name : extension.substr(1));
+      const std::string name = targetOf(*format, extension);
+      if (name == format->name && extension != format->extensions.front()) continue;
       all.push_back({name,
                      [format, file](const std::string& bytes, const fs::path& folder) {
                        readByFormat(*format, place(folder, file, bytes), bytes.size());
@@ -254,6 +253,11 @@ void addTexts(std::vector<Target>& all) {
 }
 
 }  // namespace
+
+std::string targetOf(const caches::CacheFormat& format, std::string_view extension) {
+  // Leica's tables begin with a count.
+  return std::string(extension == ".pts" ? "pts" : format.name);
+}
 
 std::string gzip(const std::string& bytes, int level) {
   return packed(bytes, level, 15 + 16);

@@ -8,6 +8,8 @@
 #include <string_view>
 #include <vector>
 
+#include "photosphere/caches/cache_format.h"
+
 namespace photosphere::fuzz {
 
 struct Target {
@@ -31,6 +33,10 @@ const Target* findTarget(std::string_view name);
 struct Specimen {
   std::string target, name, bytes;
 };
+
+/// The target that reads a format's files of this extension; extensions that a reader treats alike
+/// share one.
+std::string targetOf(const caches::CacheFormat& format, std::string_view extension);
 
 /// At least one for each target: by the writers where there are any, else made here.
 std::vector<Specimen> specimens();

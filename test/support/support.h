@@ -15,6 +15,13 @@ namespace photosphere::test {
 /// True in builds that a sanitizer slows down ten times: tests that average over many random paths
 /// then run the same code on fewer.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define PHOTOSPHERE_SANITIZED 1
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
+#define PHOTOSPHERE_SANITIZED 1
+#endif
+#endif
+#if defined(PHOTOSPHERE_SANITIZED)
 inline constexpr bool kSanitized = true;
 #else
 inline constexpr bool kSanitized = false;
