@@ -10,6 +10,7 @@
 #include "light_stage.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/frames.h"
+#include "photosphere/core/log.h"
 #include "photosphere/core/resources.h"
 
 namespace photosphere::scene {
@@ -147,6 +148,8 @@ FrameStatistics traceScene(const SceneFile& written, std::int64_t frame, const s
   FrameSetup setup = setUpFrame(scene, frame, options);
   FrameStatistics statistics;
   startStatistics(scene, setup, statistics);
+  for (const std::string& note : setup.notes)
+    log::info("frame {}: {}", frame, note);
   checkMemory(setup, true);
   const estimators::LightField field = lightField(scene, request, setup, statistics);
   const Stopwatch writing;

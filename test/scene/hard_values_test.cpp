@@ -55,9 +55,9 @@ TEST_F(HardValues, CarriersThatCoincideCountOnce) {
 TEST_F(HardValues, AKernelIsNoWiderThanCanBePaid) {
   const std::string file = write("a.vdb", {ballGrid("density", Vec3d(0), 0.1)});
   const FrameSetup wide = setUp(file, {"estimator.radius=100"});
-  EXPECT_NEAR(wide.layout.radius, 16 * 0.2, 1e-6);
+  EXPECT_NEAR(wide.layout.radius, 8 * 0.2, 1e-6);
   EXPECT_TRUE(notes(wide, "spans 500 light voxels"));
-  EXPECT_NEAR(setUp(file, {"estimator.radius=3"}).layout.radius, 3, 1e-6);
+  EXPECT_NEAR(setUp(file, {"estimator.radius=1.5"}).layout.radius, 1.5, 1e-6);
   // A photon map searches what is there.
   EXPECT_FALSE(notes(setUp(file, {"estimator.radius=100", "estimator.type=photon_map"}), "spans"));
 }
