@@ -190,7 +190,8 @@ class Table {
     if (o.kind == "path") {
       append(sets, e.truth);
       append(sets, {"estimator.type=\"path_traced\"", "scene.seed=77",
-                    fmt::format("estimator.samples={}", o.samples > 0 ? o.samples : 2048)});
+                    fmt::format("estimator.samples={}",
+                                (o.samples > 0 ? o.samples : 2048) / (m_options.quick ? 4 : 1))});
     } else {
       append(sets, e.set);
     }
