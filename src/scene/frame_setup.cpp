@@ -339,7 +339,7 @@ void heedParallax(const SceneFile& scene, FrameSetup& setup) {
 
 // Radius of the kernel over fluence that the work grows with the third power of [light voxels].
 // Four are mush already (automaticRadius).
-constexpr int kMostVoxelsWide = 16;
+constexpr int kMostVoxelsWide = 8;
 
 void buildLayout(const SceneFile& scene, const SetupOptions& options, FrameSetup& setup) {
   using namespace estimators;

@@ -12,6 +12,7 @@
 #include "photosphere/core/frames.h"
 #include "photosphere/core/hash.h"
 #include "photosphere/core/interrupt.h"
+#include "photosphere/core/log.h"
 #include "photosphere/core/resources.h"
 #include "photosphere/core/version.h"
 
@@ -185,6 +186,8 @@ FrameStatistics traceScene(const SceneFile& written, std::int64_t frame, const s
   if (request.checkpoint) request.checkpoint->identify(workOf("trace", scene, setup, request, {}));
   transport::TraceStatistics traced;
   estimators::LightSums light = lightSums(request, setup, statistics, traced);
+  for (const std::string& note : setup.notes)
+    log::info("frame {}: {}", frame, note);
   const std::string path = framePath(output, frame);
   const Stopwatch writing;
   const InterruptDelay delay;  // what is traced is written

@@ -186,7 +186,8 @@ std::span<const Param> estimatorParams() {
        .defaultText = "auto",
        .help =
            "how directions are stored; auto = view, or histogram with a light cache, an option of "
-           "bins, or a phase function with a lobe of |g| >= 0.85 (then of 4 rows)",
+           "bins, or phase functions with a lobe of |g| >= 0.85 and not all >= 0.99 (then of 4 "
+           "rows)",
        .choices = "auto|histogram|spherical_harmonics|view"},
       {.name = "deposit",
        .type = ParamType::text,
@@ -422,8 +423,8 @@ std::span<const Param> renderParams() {
        .unit = "",
        .defaultText = "1.0",
        .help = "march step over voxel edge",
-       .min = 0.01,
-       .max = 100},
+       .min = 0.001,
+       .max = 1e6},
       {.name = "shadow",
        .type = ParamType::text,
        .unit = "",

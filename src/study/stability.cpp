@@ -102,16 +102,17 @@ class Table {
   }
 
   std::vector<const StabilityEstimator*> estimatorsOf(const StabilityCase& c) const {
-    const Sets& named =
-        m_options.quick && !c.quickEstimators.empty() ? c.quickEstimators : c.estimators;
+    const auto holds = [](const Sets& names, const std::string& name) {
+      return std::find(names.begin(), names.end(), name) != names.end();
+    };
+    const bool ownQuick = m_options.quick && !c.quickEstimators.empty();
+    const Sets& named = ownQuick ? c.quickEstimators : c.estimators;
     std::vector<const StabilityEstimator*> out;
     for (const StabilityEstimator& e : m_catalogue.estimators) {
-      const bool taken =
-          named.empty() ? e.always : std::find(named.begin(), named.end(), e.name) != named.end();
-      const bool asked = m_options.estimators.empty() ||
-                         std::find(m_options.estimators.begin(), m_options.estimators.end(),
-                                   e.name) != m_options.estimators.end();
-      if (taken && asked) out.push_back(&e);
+      const bool taken = named.empty() ? e.always : holds(named, e.name);
+      const bool small = !m_options.quick || ownQuick || e.quick;
+      const bool asked = m_options.estimators.empty() || holds(m_options.estimators, e.name);
+      if (taken && small && asked) out.push_back(&e);
     }
     return out;
   }
@@ -189,7 +190,8 @@ class Table {
     if (o.kind == "path") {
       append(sets, e.truth);
       append(sets, {"estimator.type=\"path_traced\"", "scene.seed=77",
-                    fmt::format("estimator.samples={}", o.samples > 0 ? o.samples : 2048)});
+                    fmt::format("estimator.samples={}",
+                                (o.samples > 0 ? o.samples : 2048) / (m_options.quick ? 4 : 1))});
     } else {
       append(sets, e.set);
     }

@@ -196,6 +196,7 @@ void readEstimators(const fs::path& path, StabilityCatalogue& catalogue) {
     from.texts("set", e.set);
     from.texts("truth", e.truth);
     from.flag("always", e.always);
+    from.flag("quick", e.quick);
     from.finish();
     catalogue.estimators.push_back(std::move(e));
   }

@@ -60,6 +60,7 @@ struct StabilityEstimator {
   std::vector<std::string> set;
   std::vector<std::string> truth;  ///< settings of path tracing that has the same answer
   bool always = true;              ///< false = only in cases that name it
+  bool quick = true;  ///< false = in the small size, only where `quick_estimators` name it
 };
 
 struct StabilityCatalogue {

@@ -51,7 +51,7 @@ TEST(ThickSmoke, TransmittanceAlongItsEdgeIsUnbiased) {
       const Vec3f o(-0.5f, 0.03f, static_cast<float>(-0.5 + height));
       const double sigma = static_cast<double>(medium.extinction(o + Vec3f(0.5f, 0, 0)));
       double error = 0;
-      const int count = kSanitized ? 500 : 20000;
+      const int count = kSanitized ? 200 : 2000;
       const double mean =
           meanTransmittance(medium, o, Vec3f(1, 0, 0), 1.0f, count, counters, error);
       EXPECT_NEAR(mean, std::exp(-sigma), 4 * error + 1e-4) << depth << ' ' << wanted;

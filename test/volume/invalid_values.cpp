@@ -84,7 +84,9 @@ TEST(GridVariants, KeepTheValues) {
     EXPECT_EQ(volume::statistics(to).max, type == "bool" ? 1 : 1000) << type;
   }
   EXPECT_THROW(volume::ofType(from, "quad"), InputError);
-  EXPECT_FALSE(volume::inFrustum(from).isAffine());
+  const volume::Grid block =
+      volume::denseToGrid("density", Vec3i(3), std::vector<float>(27, 1.0f), Mat4d(1.0));
+  EXPECT_FALSE(volume::inFrustum(block).isAffine());
 }
 
 }  // namespace

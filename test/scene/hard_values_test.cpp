@@ -1,0 +1,86 @@
+// Densities, particles and settings at the edge of what numbers hold, as a frame is set up.
+
+#include "fixture.h"
+
+namespace photosphere::test {
+namespace {
+
+using namespace scene;
+
+class HardValues : public ::testing::Test {
+ protected:
+  std::string write(const std::string& name, const std::vector<volume::Grid>& grids) {
+    const std::string path = (m_folder / name).string();
+    volume::writeVdb(path, grids);
+    return path;
+  }
+  FrameSetup setUp(const std::string& file, const std::vector<std::string>& sets = {}) {
+    return setUpFrame(parseScene(ballScene(file, Vec3d(0), 1), "t.toml", m_folder.path(), sets), 1);
+  }
+  static bool notes(const FrameSetup& setup, const std::string& text) {
+    for (const std::string& note : setup.notes)
+      if (note.find(text) != std::string::npos) return true;
+    return false;
+  }
+  TemporaryFolder m_folder;
+};
+
+TEST_F(HardValues, DensityPastMeasureIsCutAndSaid) {
+  const FrameSetup setup = setUp(write("a.vdb", {ballGrid("density", Vec3d(0), 0.1, 1e30f)}));
+  EXPECT_TRUE(notes(setup, "an optical depth of 3e+29 in one voxel"));
+  // 1e4 optical depths in a voxel of 0.1 m.
+  EXPECT_NEAR(static_cast<double>(setup.medium->majorants().maximum()), 1e5, 1);
+  const FrameSetup plain = setUp(write("b.vdb", {ballGrid("density", Vec3d(0), 0.1, 3e4f)}));
+  EXPECT_FALSE(notes(plain, "optical depth"));
+  EXPECT_NEAR(static_cast<double>(plain.medium->majorants().maximum()), 9e4, 1);
+}
+
+TEST_F(HardValues, ScaleAndDensityNeedNotFitAFloatAlone) {
+  const FrameSetup setup = setUp(write("a.vdb", {ballGrid("density", Vec3d(0), 0.1, 1e-40f)}),
+                                 {"volume.0.density_scale=3e40"});
+  EXPECT_NEAR(static_cast<double>(setup.medium->majorants().maximum()), 3.0, 1e-3);
+}
+
+TEST_F(HardValues, CarriersThatCoincideCountOnce) {
+  volume::ParticleSet set;
+  for (int i = 0; i < 10; ++i)
+    set.positions.emplace_back(0.25 * (i % 3), 0, 0);
+  const std::string file =
+      write("a.vdb", {ballGrid("density", Vec3d(0), 0.1), volume::pointsToGrid(set, "points", 1)});
+  const FrameSetup setup = setUp(file, {"estimator.carrier=particles"});
+  EXPECT_EQ(setup.particles.size(), 3u);
+  EXPECT_TRUE(notes(setup, "7 of 10 particles lie exactly where others do"));
+}
+
+TEST_F(HardValues, AKernelIsNoWiderThanCanBePaid) {
+  const std::string file = write("a.vdb", {ballGrid("density", Vec3d(0), 0.1)});
+  const FrameSetup wide = setUp(file, {"estimator.radius=100"});
+  EXPECT_NEAR(wide.layout.radius, 8 * 0.2, 1e-6);
+  EXPECT_TRUE(notes(wide, "spans 500 light voxels"));
+  EXPECT_NEAR(setUp(file, {"estimator.radius=1.5"}).layout.radius, 1.5, 1e-6);
+  // A photon map searches what is there.
+  EXPECT_FALSE(notes(setUp(file, {"estimator.radius=100", "estimator.type=photon_map"}), "spans"));
+}
+
+TEST_F(HardValues, NeedlesAreNotStoredInBins) {
+  const std::string file = write("a.vdb", {ballGrid("density", Vec3d(0), 0.1)});
+  EXPECT_EQ(setUp(file, {"volume.0.phase={ g = 0.98 }"}).layout.basis,
+            estimators::Basis::histogram);
+  EXPECT_EQ(setUp(file, {"volume.0.phase={ g = -0.99 }"}).layout.basis, estimators::Basis::view);
+}
+
+TEST_F(HardValues, OneHugeParticleIsNamed) {
+  volume::ParticleSet set;
+  for (int i = 0; i < 20; ++i)
+    set.positions.emplace_back(0.1 * i, 0, 0);
+  std::vector<float> radii(20, 0.1f);
+  radii[5] = 1e6f;
+  set.add({"pscale", 1, radii});
+  const std::string file = write("a.vdb", {volume::pointsToGrid(set, "points", 1)});
+  EXPECT_NE(complaint([&] { setUp(file); }, ExitCode::memory).find("1e+07 times their median"),
+            std::string::npos);
+  EXPECT_EQ(complaint([&] { setUp(file, {"volume.0.particle_radius=0.2"}); }), "");
+}
+
+}  // namespace
+}  // namespace photosphere::test
