@@ -157,7 +157,9 @@ class MarchIntegrator final : public Integrator {
     const float slope = majorant * m_medium.steepness();
     for (float t0 = cell.t0; t0 < cell.t1;) {
       Vec3f carrier(0.0f);
-      const float here = extinctionAt(extinction, cell.ray, t0, when, carrier);
+      const float here = transport::extinctionOnward(
+          [&](float t) { return extinctionAt(extinction, cell.ray, t, when, carrier); }, t0,
+          majorant / slope);
       const float part = std::min(m_step, transport::thinPart(here, slope, kStepDepth));
       const float t1 = std::min(t0 + std::max(part, kResolution * t0), cell.t1);
       const float middle = 0.5f * (t0 + t1);

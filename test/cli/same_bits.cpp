@@ -80,14 +80,14 @@ const Way kWays[] = {
       "estimator.final_gather=120"}},
     {"Paper",
      {"-s", "estimator.preset=paper", "-s", "estimator.photons=3000"},
-     {"-s", "estimator.photons=40000", "-s", "render.samples=16"}},
+     {"-s", "estimator.photons=60000", "-s", "render.samples=48"}},
     {"Steered", {"-s", "estimator.importance=on"}, kSomePhotons},
     {"PhotonMap",
      {"-s", "estimator.type=photon_map", "-s", "estimator.passes=2"},
      {"-s", "estimator.photons=200000", "-s", "estimator.passes=4", "-s", "render.samples=32"}},
     {"Paths",
      {"-s", "estimator.type=path_traced", "-s", "estimator.samples=20"},
-     {"-s", "estimator.samples=500"}},
+     {"-s", "estimator.samples=900"}},
     {"TargetError",
      {"--target-error", "0.3", "-s", "estimator.photons=8000"},
      {"-s", "estimator.photons=400000", "-s", "render.samples=200"}},
@@ -332,7 +332,7 @@ class Interrupted : public SameBits {
 TEST_F(Interrupted, EndsWith75AndGoesOn) {
   const std::string paths =
       "render scene.toml -o x.exr --frames 1 --float -s estimator.type=path_traced -s "
-      "estimator.samples=160";
+      "estimator.samples=1200";
   const RunResult stopped =
       signalAt(paths + " --checkpoint-interval 0.1", "x.exr.checkpoint/frame");
   ASSERT_EQ(stopped.exitCode, 75) << stopped.err;
@@ -350,7 +350,7 @@ TEST_F(Interrupted, EndsWith75AndGoesOn) {
   EXPECT_NE(result.err.find("goes on from"), std::string::npos) << result.err;
   EXPECT_FALSE(fs::exists(m_folder / "x.exr.checkpoint"));
   ASSERT_EQ(run({"render", "scene.toml", "-o", "whole.exr", "--frames", "1", "--float", "-s",
-                 "estimator.type=path_traced", "-s", "estimator.samples=160"})
+                 "estimator.type=path_traced", "-s", "estimator.samples=1200"})
                 .exitCode,
             0);
   expectSamePixels("whole.exr", "x.exr");
@@ -364,7 +364,7 @@ TEST_F(Interrupted, EndsWith75AndGoesOn) {
 TEST_F(Interrupted, FinishedFramesAreNotMadeAgain) {
   const std::string job =
       "render scene.toml -o x.####.exr --stats s.json --float --frames 1-3 -s "
-      "estimator.type=path_traced -s estimator.samples=160";
+      "estimator.type=path_traced -s estimator.samples=1200";
   const RunResult stopped = signalAt(job, "x.0001.exr");
   ASSERT_EQ(stopped.exitCode, 75) << stopped.err;
   const auto written = fs::last_write_time(m_folder / "x.0001.exr");

@@ -54,6 +54,15 @@ inline float thinPart(float sigma, float slope, float depth) {
   return 2.0f * depth / (sigma + std::sqrt(sigma * sigma + 4.0f * slope * depth));
 }
 
+/// Extinction from where a part begins on. Smoke may begin at a face, of which rounding tells
+/// either side: what lies a little farther counts too.
+/// @param spacing  of nodes along any direction, at least [m]
+template <class Along>
+inline float extinctionOnward(const Along& extinction, float t, float spacing) {
+  constexpr float kLittle = 0x1p-10f;
+  return glm::max(extinction(t), extinction(t + glm::max(kLittle * spacing, 0x1p-21f * t)));
+}
+
 /// A cell so thick that a walk past the edge of its smoke would draw many collisions that are none
 /// is walked in parts, each with a majorant of its own: extinction where the part begins, plus what
 /// it can rise by on the way (Medium::steepness). Their number grows with the root of the depth.
@@ -67,12 +76,16 @@ inline bool walkThickCell(const Along& extinction, float t, float end, float maj
   constexpr float kWholeDepth = 16.0f;     // of one near the cell's own majorant
   constexpr float kResolution = 0x1p-21f;  // of distances, as a part of them
   while (t < end) {
-    const float sigma = extinction(t);
-    ++counters.lookups;
+    const float sigma = extinctionOnward(extinction, t, majorant / slope);
+    counters.lookups += 2;
     float part = kWholeDepth / majorant, bound = majorant;
     if (sigma < 0.25f * majorant) {
       part = glm::max(thinPart(sigma, slope, kPartDepth), kResolution * t);
-      bound = glm::min(majorant, (sigma + slope * part) * 1.0001f);
+      // Faces are steeper than that: one that lies within the part shows at its end.
+      bound =
+          glm::max(sigma + slope * part, extinctionOnward(extinction, t + part, majorant / slope));
+      bound = glm::min(majorant, bound * 1.0001f);
+      counters.lookups += 2;
     }
     const float stop = glm::min(end, t + glm::max(part, kResolution * t));
     while (true) {
