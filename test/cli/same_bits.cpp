@@ -1,6 +1,8 @@
 // The same scene and seed give the same pixels: for any number of threads, by shards, through a
 // light cache, and after an interruption.
 
+#include <fmt/format.h>
+
 #include <cstring>
 
 #include "fixture.h"
@@ -168,7 +170,7 @@ class Shards : public SameBits {
     std::vector<std::string> files;
     for (int i = 1; i <= count; ++i) {
       const std::string number = std::to_string(i) + "/" + std::to_string(count);
-      files.push_back("s" + std::to_string(i) + "of" + std::to_string(count) + ".vdb");
+      files.push_back(fmt::format("s{}of{}.vdb", i, count));
       const RunResult result = run(
           {"trace", "scene.toml", "-o", files.back(), "--frames", "1", "--shard", number}, more);
       EXPECT_EQ(result.exitCode, 0) << result.err;

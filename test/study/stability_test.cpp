@@ -40,7 +40,7 @@ std::string complaintAbout(const std::string& cases) {
   const TemporaryFolder folder;
   writeCatalogue(folder, cases);
   try {
-    runStability({.catalogue = folder.path(), .quick = true}, {});
+    runStability({.catalogue = folder.path(), .quick = true, .cases = {}, .estimators = {}}, {});
   } catch (const ConfigError& error) {
     return error.what();
   }
@@ -92,7 +92,8 @@ TEST(Stability, TheCatalogueRefusesWhatItDoesNotKnow) {
 std::vector<StabilityRow> rowsOf(const std::string& cases) {
   const TemporaryFolder folder;
   writeCatalogue(folder, cases);
-  return runStability({.catalogue = folder.path(), .quick = true}, {});
+  return runStability({.catalogue = folder.path(), .quick = true, .cases = {}, .estimators = {}},
+                      {});
 }
 
 // Every kind of oracle must be able to say no.
