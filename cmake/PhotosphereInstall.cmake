@@ -8,7 +8,7 @@ install(TARGETS photosphere_app RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}")
 install(DIRECTORY "${PROJECT_SOURCE_DIR}/include/photosphere"
   DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}" FILES_MATCHING PATTERN "*.h")
 install(DIRECTORY "${PROJECT_SOURCE_DIR}/data/color" "${PROJECT_SOURCE_DIR}/data/hard"
-  "${PROJECT_SOURCE_DIR}/data/studies"
+  "${PROJECT_SOURCE_DIR}/data/reference" "${PROJECT_SOURCE_DIR}/data/studies"
   DESTINATION "${CMAKE_INSTALL_DATADIR}/photosphere")
 install(EXPORT photosphereTargets NAMESPACE photosphere:: DESTINATION "${package_dir}")
 

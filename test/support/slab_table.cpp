@@ -13,7 +13,7 @@ namespace photosphere::test {
 const std::vector<SlabRow>& slabTable() {
   static const std::vector<SlabRow> rows = [] {
     std::vector<SlabRow> read;
-    std::ifstream in(projectFile("test/reference/slab.csv"));
+    std::ifstream in(projectFile("data/reference/slab.csv"));
     std::string line;
     std::getline(in, line);
     while (std::getline(in, line)) {

@@ -1,5 +1,5 @@
 #pragma once
-// Reference values of plane-parallel slabs (test/reference/slab.csv).
+// Reference values of plane-parallel slabs (data/reference/slab.csv).
 
 #include <string>
 #include <vector>
