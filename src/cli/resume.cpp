@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <sstream>
 
 #include "photosphere/core/error.h"
 #include "photosphere/core/frames.h"
@@ -19,15 +20,19 @@ Resume parseWhen(const std::string& when) {
   return when == "require" ? Resume::require : Resume::automatic;
 }
 
-// Frames that a job of that identity had finished, from what its checkpoint says.
-std::vector<std::int64_t> finishedFrames(const std::string& note, const std::string& identity) {
-  const std::size_t line = note.find('\n');
-  if (line == std::string::npos || note.substr(0, line) != identity) return {};
+// Frames of one line of a note; none where it cannot be read.
+std::vector<std::int64_t> framesOf(const std::string& line) {
+  if (line.empty()) return {};
   try {
-    return parseFrames(note.substr(line + 1));
+    return parseFrames(line);
   } catch (const ConfigError&) {
     return {};
   }
+}
+
+std::string lineOf(const std::set<std::int64_t>& frames) {
+  if (frames.empty()) return {};
+  return formatFrames(std::vector<std::int64_t>(frames.begin(), frames.end()));
 }
 
 }  // namespace
@@ -61,9 +66,7 @@ ResumableJob::ResumableJob(const ResumeOptions& options, std::string identity,
     std::error_code error;
     if (!std::filesystem::is_directory(folder, error)) continue;
     any = true;
-    if (const auto note = Checkpoint::note(folder))
-      for (const std::int64_t done : finishedFrames(*note, m_identity))
-        m_earlier.insert(done);
+    if (const auto note = Checkpoint::note(folder)) readNote(*note);
   }
   if (m_when == Resume::require && !any)
     throw InputMissingError(
@@ -72,17 +75,33 @@ ResumableJob::ResumableJob(const ResumeOptions& options, std::string identity,
   m_finished = m_earlier;
 }
 
+// The job, its finished frames, and those of them that missed their target: a line each.
+std::string ResumableJob::note() const {
+  return m_identity + '\n' + lineOf(m_finished) + '\n' + lineOf(m_missed);
+}
+
+void ResumableJob::readNote(const std::string& note) {
+  std::istringstream lines(note);
+  std::string identity, done, missed;
+  std::getline(lines, identity);
+  if (identity != m_identity) return;
+  std::getline(lines, done);
+  std::getline(lines, missed);
+  for (const std::int64_t frame : framesOf(done))
+    m_earlier.insert(frame);
+  for (const std::int64_t frame : framesOf(missed))
+    m_missed.insert(frame);
+}
+
 Checkpoint& ResumableJob::begin(std::int64_t frame) {
   m_current.emplace(Checkpoint::folderOf(m_outputOf(frame)), m_options.interval, m_when);
-  if (!m_finished.empty())
-    m_current->noteAlong(
-        m_identity + '\n' +
-        formatFrames(std::vector<std::int64_t>(m_finished.begin(), m_finished.end())));
+  if (!m_finished.empty()) m_current->noteAlong(note());
   return *m_current;
 }
 
-void ResumableJob::finished(std::int64_t frame) {
+void ResumableJob::finished(std::int64_t frame, bool missed) {
   m_finished.insert(frame);
+  if (missed) m_missed.insert(frame);
   if (m_current) m_current->discard();
   m_current.reset();
 }

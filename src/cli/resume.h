@@ -39,21 +39,25 @@ class ResumableJob {
   bool hadFinished(std::int64_t frame) const { return m_earlier.count(frame) != 0; }
   /// Begins a frame. The checkpoint is the job's.
   Checkpoint& begin(std::int64_t frame);
-  /// The frame is on disk: its checkpoint is removed.
-  void finished(std::int64_t frame);
+  /// The frame is on disk: its checkpoint is removed. @param missed  it has not reached its target
+  void finished(std::int64_t frame, bool missed = false);
+  /// Whether a frame missed its target, before the interruption or since.
+  bool missed() const { return !m_missed.empty(); }
 
   /// Runs the job. @return its exit code, or 75 after an interruption, of which the user is told
   int run(const std::function<int()>& body);
 
  private:
   void keepFinished();
+  std::string note() const;
+  void readNote(const std::string& note);
 
   ResumeOptions m_options;
   Resume m_when;
   std::string m_identity;
   std::vector<std::int64_t> m_frames;
   OutputOf m_outputOf;
-  std::set<std::int64_t> m_earlier, m_finished;
+  std::set<std::int64_t> m_earlier, m_finished, m_missed;
   std::optional<Checkpoint> m_current;
 };
 

@@ -78,7 +78,7 @@ void writeSealed(const fs::path& path, std::string_view work, const WriteState& 
     write(out);
     out.close();
   } catch (const std::ios_base::failure&) {
-    throw OutputError(path.string(), fmt::format("cannot be written: {}", std::strerror(errno)));
+    throw OutputError(path.string(), "cannot be written: " + describeWriteError(errno));
   }
   file.commit();
 }
@@ -137,16 +137,11 @@ fs::path Checkpoint::folderOf(const fs::path& output) {
 
 Checkpoint::Checkpoint(fs::path folder, double interval, Resume resume)
     : m_folder(std::move(folder)), m_interval(interval), m_resume(resume) {
-  if (m_resume == Resume::never) drop();
+  if (m_resume == Resume::never) discard();
 }
 
 fs::path Checkpoint::fileOf(const std::string& part) const {
   return m_folder / part;
-}
-
-void Checkpoint::drop() {
-  std::error_code ignored;
-  fs::remove_all(m_folder, ignored);
 }
 
 void Checkpoint::identify(const std::string& work) {
@@ -218,7 +213,8 @@ bool Checkpoint::exists() const {
 }
 
 void Checkpoint::discard() {
-  drop();
+  std::error_code ignored;
+  fs::remove_all(m_folder, ignored);
 }
 
 }  // namespace photosphere

@@ -11,6 +11,7 @@
 
 #include "photosphere/core/error.h"
 #include "photosphere/core/log.h"
+#include "photosphere/core/shipped_data.h"
 
 namespace photosphere::image {
 
@@ -107,21 +108,13 @@ void ColorConverter::apply(std::span<float> rgb) const {
 }
 
 std::string shippedColorConfig() {
+  constexpr const char* kConfig = "color/config.ocio";
+  if (const auto found = findShipped(kConfig)) return found->string();
   std::vector<std::string> places;
-  if (const char* data = std::getenv("PHOTOSPHERE_DATA"); data && *data)
-    places.push_back((fs::path(data) / "color/config.ocio").string());
-  // Beside an installed tool first: the source tree that built it may be gone, or changed.
-  std::error_code error;
-  const fs::path executable = fs::read_symlink("/proc/self/exe", error);
-  if (!error) {
-    const fs::path prefix = executable.parent_path().parent_path();
-    places.push_back((prefix / "share/photosphere/color/config.ocio").string());
-  }
-  places.push_back((fs::path(PHOTOSPHERE_DATA_DIR) / "color/config.ocio").string());
-  for (const std::string& place : places)
-    if (fs::is_regular_file(place, error)) return place;
+  for (const fs::path& place : shippedPlaces(kConfig))
+    places.push_back(place.string());
   throw InputMissingError(
-      "color/config.ocio",
+      kConfig,
       fmt::format("the colour config shipped with this tool is in none of {}; set PHOTOSPHERE_DATA "
                   "to the folder that holds color/, or give a config with --ocio",
                   listNames(places)));

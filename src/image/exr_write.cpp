@@ -96,7 +96,7 @@ std::string pixelName(const Image& image, const Channel& channel, std::size_t in
 }
 
 /// Refuses what must not reach a file. @return true when all colour fits half
-bool checkPixels(const std::string& path, const Image& image) {
+bool checkPixels(const std::string& path, const Image& image, bool floatAsked) {
   const Channel* worst = nullptr;
   std::size_t worstIndex = 0;
   float worstValue = HALF_MAX;
@@ -119,6 +119,7 @@ bool checkPixels(const std::string& path, const Image& image) {
       worstValue = std::abs(value);
     }
   if (!worst) return true;
+  if (floatAsked) return false;
   log::warning("{}: {} is {}, above the largest half (65504): colour is written as float", path,
                pixelName(image, *worst, worstIndex), worst->pixels[worstIndex]);
   return false;
@@ -202,7 +203,7 @@ void writeExr(const std::filesystem::path& path, const Image& image,
               const ExrAttributes& attributes, const ExrOptions& options) {
   const std::string name = path.string();
   if (image.channels().empty()) throw OutputError(name, "not written: the image has no channels");
-  const bool halfFits = checkPixels(name, image);
+  const bool halfFits = checkPixels(name, image, options.floatColor);
   const bool halfColor = halfFits && !options.floatColor;
   OutputFile output(path);
   uint64_t size = 0;

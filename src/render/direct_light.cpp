@@ -37,26 +37,55 @@ Rgb phased(const Medium& medium, const Coefficients& c, const Vec3f& wi, const V
 DirectLight::DirectLight(const Medium& medium, const transport::LightList& lights,
                          const Shadows& shadows, bool useShadows, bool carried)
     : m_medium(medium), m_lights(lights), m_shadows(shadows), m_useShadows(useShadows) {
+  std::vector<const lights::Light*> lamps;
   for (std::size_t i = 0; i < lights.size(); ++i)
-    if (lights[i]->isDelta() || !carried) m_lamps.push_back(i);
+    if (lights[i]->isDelta() || !carried) {
+      m_lamps.push_back(i);
+      lamps.push_back(lights[i].get());
+    }
+  if (lamps.size() > LampChoice::kFew) m_choice = std::make_shared<LampChoice>(medium, lamps);
+}
+
+DirectLight DirectLight::withShadows() const {
+  DirectLight shadowed = *this;
+  shadowed.m_useShadows = true;
+  return shadowed;
+}
+
+// Of one lamp.
+template <class Light, class When>
+Rgb DirectLight::of(std::size_t i, const Vec3f& p, const Vec3f& wo, const Coefficients& c,
+                    const MarchStep* step, Rng& rng, IntegratorCounters& counters,
+                    When when) const {
+  const lights::Light& light = *m_lights[i];
+  const Vec2f u = light.isDelta() ? Vec2f(0.5f) : rng.uniform2();
+  lights::Illumination in = light.illuminate(p, u);
+  if (!(maxComponent(in.irradiance) > 0.0f)) return Rgb(0.0f);
+  if (step && in.distance < 8.0f * (step->t1 - step->t0))
+    in.irradiance *= nearLampFactor(*step, p, in);
+  const Light visible = m_useShadows
+                            ? m_shadows.transmittance<Light>(i, p, in.direction, in.distance, rng,
+                                                             counters.tracking, when)
+                            : Light(1.0f);
+  return phased(m_medium, c, in.direction, wo) * in.irradiance * visible;
 }
 
 template <class Light, class When>
 Rgb DirectLight::at(const Vec3f& p, const Vec3f& wo, const Coefficients& c, const MarchStep* step,
                     Rng& rng, IntegratorCounters& counters, When when) const {
   Rgb sum(0.0f);
-  for (const std::size_t i : m_lamps) {
-    const lights::Light& light = *m_lights[i];
-    const Vec2f u = light.isDelta() ? Vec2f(0.5f) : rng.uniform2();
-    lights::Illumination in = light.illuminate(p, u);
-    if (!(maxComponent(in.irradiance) > 0.0f)) continue;
-    if (step && in.distance < 8.0f * (step->t1 - step->t0))
-      in.irradiance *= nearLampFactor(*step, p, in);
-    const Light visible = m_useShadows
-                              ? m_shadows.transmittance<Light>(i, p, in.direction, in.distance, rng,
-                                                               counters.tracking, when)
-                              : Light(1.0f);
-    sum += phased(m_medium, c, in.direction, wo) * in.irradiance * visible;
+  if (!m_choice) {
+    for (const std::size_t i : m_lamps)
+      sum += of<Light>(i, p, wo, c, step, rng, counters, when);
+    return sum;
+  }
+  constexpr int drawn = LampChoice::kDrawn;
+  const double offset = rng.uniformDouble();
+  for (int k = 0; k < drawn; ++k) {
+    const LampChoice::Drawn lamp = m_choice->at(p, (k + offset) / drawn);
+    if (lamp.probability > 0.0f)
+      sum += of<Light>(m_lamps[lamp.lamp], p, wo, c, step, rng, counters, when) /
+             (static_cast<float>(drawn) * lamp.probability);
   }
   return sum;
 }

@@ -2,8 +2,10 @@
 // Light of lamps that scatters at a point for the first time: next-event estimation with the
 // frame's shadows.
 
+#include <memory>
 #include <vector>
 
+#include "lamp_choice.h"
 #include "photosphere/core/effects.h"
 #include "photosphere/render/integrator.h"
 #include "photosphere/render/shadows.h"
@@ -23,8 +25,12 @@ class DirectLight {
   DirectLight(const transport::Medium& medium, const transport::LightList& lights,
               const Shadows& shadows, bool useShadows, bool carried);
 
-  /// Light scattered at `p` toward `wo` [W m^-3 sr^-1]. Where `p` is the middle of a march step, a
-  /// near lamp's 1/d^2 is averaged over the step.
+  /// The same, shadows used whatever the effects are.
+  DirectLight withShadows() const;
+
+  /// Light scattered at `p` toward `wo` [W m^-3 sr^-1]: of every lamp, or, where there are more
+  /// than LampChoice::kFew, its unbiased estimate from a few of them. Where `p` is the middle of a
+  /// march step, a near lamp's 1/d^2 is averaged over the step.
   /// @tparam Light  of transmittances: float, or Rgb where extinction differs from channel to
   ///                channel
   template <class Light, class When>
@@ -32,11 +38,16 @@ class DirectLight {
          Rng& rng, IntegratorCounters& counters, When when) const;
 
  private:
+  template <class Light, class When>
+  Rgb of(std::size_t light, const Vec3f& p, const Vec3f& wo, const transport::Coefficients& c,
+         const MarchStep* step, Rng& rng, IntegratorCounters& counters, When when) const;
+
   const transport::Medium& m_medium;
   const transport::LightList& m_lights;
   const Shadows& m_shadows;
   bool m_useShadows;
   std::vector<std::size_t> m_lamps;
+  std::shared_ptr<const LampChoice> m_choice;  // of many lamps
 };
 
 }  // namespace photosphere::render

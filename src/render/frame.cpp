@@ -159,13 +159,13 @@ class FrameLoop {
   // All that the bands so far have made.
   template <class Loop, class State>
   static void eachMember(Loop& loop, State& state) {
-    state(loop.m_first);
-    state(loop.m_row);
-    state(loop.m_out.counters);
-    state(loop.m_out.nanSamples);
-    state(loop.m_out.negativeSamples);
-    state(loop.m_out.firstBad);
-    state(loop.m_sums);
+    state.value(loop.m_first);
+    state.value(loop.m_row);
+    state.value(loop.m_out.counters);
+    state.value(loop.m_out.nanSamples);
+    state.value(loop.m_out.negativeSamples);
+    state.value(loop.m_out.firstBad);
+    state.value(loop.m_sums);
   }
   void keep(StateWriter& w) const { eachMember(*this, w); }
   void resume(StateReader& r, Progress& progress) {

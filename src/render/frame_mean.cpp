@@ -23,16 +23,16 @@ constexpr std::vector<Rgb> FrameLayers::*kColours[] = {
 // What a sum of frames is made of.
 template <class Layers, class State>
 void eachMember(Layers& layers, State& state) {
-  state(layers.crop);
-  state(layers.resolution);
+  state.value(layers.crop);
+  state.value(layers.resolution);
   for (const auto layer : kColours)
-    state(layers.*layer);
-  state(layers.alpha);
-  state(layers.depth);
-  state(layers.nanSamples);
-  state(layers.negativeSamples);
-  state(layers.firstBad);
-  state(layers.counters);
+    state.value(layers.*layer);
+  state.value(layers.alpha);
+  state.value(layers.depth);
+  state.value(layers.nanSamples);
+  state.value(layers.negativeSamples);
+  state.value(layers.firstBad);
+  state.value(layers.counters);
 }
 
 }  // namespace

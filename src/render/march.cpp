@@ -20,8 +20,6 @@ constexpr float kOpaque = 1e-5f;
 // part of the user's.
 constexpr float kStepDepth = 0.5f;
 constexpr float kFinest = 1.0f / 16.0f;
-// Parts of distances below which they are not told apart.
-constexpr float kResolution = 0x1p-21f;
 
 float exponential(float x) {
   return fastExp(x);
@@ -64,9 +62,8 @@ class MarchIntegrator final : public Integrator {
     m_stepsPerLength = 1.0f / m_step;
     m_thick = kStepDepth / (m_step * kFinest);
     if (source && options.gatherRays > 0)
-      m_gather.emplace(medium,
-                       DirectLight(medium, lights, shadows, true, source->carriesUnscattered()),
-                       *source, options.effects, options.gatherRays);
+      m_gather.emplace(medium, m_direct.withShadows(), *source, options.effects,
+                       options.gatherRays);
   }
 
   RayRadiance radiance(const Vec3d& origin, const Vec3f& direction, transport::Moment moment,
@@ -154,14 +151,15 @@ class MarchIntegrator final : public Integrator {
   bool marchThick(const MarchStep& cell, float majorant, const Along& extinction, When when,
                   Light& transmittance, RayOpacity* opacity, RayRadiance& result, Rng& rng,
                   IntegratorCounters& counters) const {
-    const float slope = majorant * m_medium.steepness();
+    const float steepness = m_medium.steepness();
     for (float t0 = cell.t0; t0 < cell.t1;) {
       Vec3f carrier(0.0f);
       const float here = transport::extinctionOnward(
           [&](float t) { return extinctionAt(extinction, cell.ray, t, when, carrier); }, t0,
-          majorant / slope);
-      const float part = std::min(m_step, transport::thinPart(here, slope, kStepDepth));
-      const float t1 = std::min(t0 + std::max(part, kResolution * t0), cell.t1);
+          1.0f / steepness);
+      const float part =
+          std::min(m_step, transport::thinPart(here, majorant * steepness, kStepDepth));
+      const float t1 = std::min(t0 + std::max(part, transport::kDistanceResolution * t0), cell.t1);
       const float middle = 0.5f * (t0 + t1);
       const float sigma = extinctionAt(extinction, cell.ray, middle, when, carrier);
       if (sigma > 0.0f)

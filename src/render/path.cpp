@@ -1,7 +1,9 @@
 #include <algorithm>
+#include <optional>
 #include <type_traits>
 
 #include "instances.h"
+#include "lamp_choice.h"
 #include "photosphere/render/integrator.h"
 #include "photosphere/transport/scatter.h"
 
@@ -39,6 +41,7 @@ class PathIntegrator final : public Integrator {
     for (double& c : m_cumulative)
       c = sum > 0 ? c / sum : 0;
     if (!(sum > 0)) m_sampled.clear();
+    if (m_sampled.size() > LampChoice::kFew) m_choice.emplace(medium, m_sampled);
   }
 
   RayRadiance radiance(const Vec3d& origin, const Vec3f& direction, transport::Moment moment,
@@ -96,9 +99,9 @@ class PathIntegrator final : public Integrator {
                      segment.begin + static_cast<double>(hit.distance)};
           continue;
         }
-      if (static_cast<std::uint32_t>(scatterings) >= transport::kLongPath) {
-        if (!(rng.uniform() < 0.999f)) return result;
-        throughput *= 1.0f / 0.999f;
+      if (transport::isLongPath(static_cast<std::uint32_t>(scatterings) + 1)) {
+        if (!(rng.uniform() < 0.5f)) return result;
+        throughput *= 2.0f;
       }
       // From inside, the walk over the majorants ends where the medium does.
       segment = {p, event.direction, kInfinity, 0.0};
@@ -150,13 +153,19 @@ class PathIntegrator final : public Integrator {
     }
   }
 
-  // Light of one lamp, chosen by power, that scatters here toward the eye.
+  // Light of one lamp, chosen by power (of many, by what they send here), that scatters here toward
+  // the eye.
   void addNextEvent(RayRadiance& result, const Rgb& throughput, const Vec3f& p, const Vec3f& d,
                     int scatterings, Rng& rng, IntegratorCounters& counters, When when) const {
     if (m_sampled.empty()) return;
     std::size_t i = 0;
     double probability = 1.0;
-    if (m_sampled.size() > 1) {
+    if (m_choice) {
+      const LampChoice::Drawn drawn = m_choice->at(p, rng.uniformDouble());
+      if (!(drawn.probability > 0.0f)) return;
+      i = drawn.lamp;
+      probability = static_cast<double>(drawn.probability);
+    } else if (m_sampled.size() > 1) {
       const double u = rng.uniformDouble();
       i = static_cast<std::size_t>(std::upper_bound(m_cumulative.begin(), m_cumulative.end(), u) -
                                    m_cumulative.begin());
@@ -197,6 +206,7 @@ class PathIntegrator final : public Integrator {
   std::vector<const lights::Light*> m_backgrounds;  // every lamp: what unscattered rays meet
   std::vector<const lights::Light*> m_escaped;      // what scattered rays meet by leaving
   std::vector<double> m_cumulative;
+  std::optional<LampChoice> m_choice;  // of many lamps
 };
 
 }  // namespace

@@ -11,26 +11,6 @@
 namespace photosphere::test {
 namespace {
 
-constexpr const char* kScene = R"([scene]
-seed_per_frame = false
-[camera]
-position = [0.6, 0.5, 5]
-look_at = [0.6, 0.5, 0.5]
-fov = 30
-resolution = [64, 48]
-[[volume]]
-file = "smoke.####.vdb"
-density_scale = 4
-[[light]]
-type = "point"
-position = [3, 3, 2]
-intensity = 50
-[estimator]
-photons = 2000
-[render]
-samples = 1
-)";
-
 /// A 64 x 48 picture; `seed` makes each of its own.
 image::Image noise(int seed) {
   image::Image picture(64, 48);
@@ -48,7 +28,7 @@ class Faults : public ::testing::Test {
  protected:
   void SetUp() override {
     writeSmokeFrames(m_folder, 3);
-    writeText(m_folder / "scene.toml", kScene);
+    writeText(m_folder / "scene.toml", litSmoke(64, 48) + "[render]\nsamples = 1\n");
     writePly(m_folder / "points.ply", ribbon(500, true));
     image::writeExr(m_folder / "a.exr", noise(1));
     image::writeExr(m_folder / "b.exr", noise(2));

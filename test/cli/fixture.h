@@ -1,6 +1,9 @@
 #pragma once
 // Files that the tests of the command line feed to the program.
 
+#include <fmt/format.h>
+
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <set>
@@ -36,6 +39,44 @@ inline void writeSmokeFrames(const TemporaryFolder& folder, int last) {
   for (int i = 1; i <= last; ++i)
     volume::writeVdb(folder / ("smoke.000" + std::to_string(i) + ".vdb"),
                      {ballOfSmoke(0.05 * (1 + i))});
+}
+
+/// A scene of those frames, lit by one lamp.
+/// @param volume  more keys of the smoke, a line each
+inline std::string litSmoke(int width, int height, int photons = 2000,
+                            const std::string& volume = {}) {
+  return fmt::format(R"([scene]
+seed_per_frame = false
+[camera]
+position = [0.6, 0.5, 5]
+look_at = [0.6, 0.5, 0.5]
+fov = 30
+resolution = [{}, {}]
+[estimator]
+photons = {}
+[[volume]]
+file = "smoke.####.vdb"
+density_scale = 4
+{}
+[[light]]
+type = "point"
+position = [3, 3, 2]
+intensity = 50
+)",
+                     width, height, photons, volume);
+}
+
+/// The first channel in which two pictures differ by any bit; empty where they are the same.
+inline std::string differingChannel(const fs::path& a, const fs::path& b) {
+  const image::Image x = image::readExr(a).image, y = image::readExr(b).image;
+  if (x.channels().size() != y.channels().size() || x.pixelCount() != y.pixelCount())
+    return "their channels or sizes differ";
+  for (std::size_t c = 0; c < x.channels().size(); ++c)
+    if (x.channels()[c].name != y.channels()[c].name ||
+        std::memcmp(x.channels()[c].pixels.data(), y.channels()[c].pixels.data(),
+                    x.pixelCount() * sizeof(float)) != 0)
+      return x.channels()[c].name;
+  return {};
 }
 
 inline double massOf(const volume::Grid& grid) {

@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 WriteState number(int value) {
   return [value](StateWriter& w) {
     w.value(value);
-    w.values(std::vector<double>{0.5, 0.25});
+    w.value(std::vector<double>{0.5, 0.25});
     w.text("so far");
   };
 }
@@ -45,7 +45,7 @@ TEST_F(CheckpointTest, GivesBackWhatWasKept) {
   ASSERT_TRUE(reader);
   EXPECT_EQ(reader->value<int>(), 7);
   std::vector<double> values;
-  reader->values(values);
+  reader->value(values);
   EXPECT_EQ(values, (std::vector<double>{0.5, 0.25}));
   EXPECT_EQ(reader->text(), "so far");
   EXPECT_TRUE(reader->atEnd());

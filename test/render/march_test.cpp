@@ -129,6 +129,21 @@ TEST(Shadows, GridPastTheBudgetIsMarched) {
       std::exp(-1.5f), 1e-4f);
 }
 
+// Smoke of several depths a voxel throughout loses its own shadow between nodes, and is tracked; a
+// thick knot in thin smoke is not worth it.
+TEST(Shadows, GridsAreForSmokeOfFewDepthsAVoxel) {
+  const auto bytes = [](const std::function<double(const Vec3d&)>& density) {
+    const transport::Medium medium =
+        makeMedium(sampledVolume(2.0, 48, {0.8, 0.0, 1 / (2.0 / 48)}, density));  // depths a voxel
+    transport::LightList lights;
+    lights.push_back(makeLight("directional", {{"position", "[0, 0, 1]"}}));
+    return render::Shadows(medium, lights, ShadowMode::grid, 0.04f, 0).memoryBytes();
+  };
+  EXPECT_EQ(bytes([](const Vec3d&) { return 5.0; }), 0u);
+  EXPECT_GT(bytes([](const Vec3d&) { return 0.5; }), 0u);
+  EXPECT_GT(bytes([](const Vec3d& p) { return glm::length(p) < 0.15 ? 20.0 : 0.3; }), 0u);
+}
+
 TEST(March, TransmittanceDoesNotDependOnTheStep) {
   const transport::Medium medium = makeMedium(boxVolume(Vec3d(2.0), Vec3i(16), {0.8, 0.0, 1.5}));
   const transport::LightList lights;

@@ -16,8 +16,9 @@
 
 namespace photosphere {
 
-/// Values one after another as bytes of this machine. A checkpoint is read by the build that wrote
-/// it, so there is no other form to agree on.
+/// Values one after another as bytes of this machine: single ones, and vectors with their size.
+/// What names the members of a state once can write it and read it, as StateReader has the same
+/// calls. A checkpoint is read by the build that wrote it, so there is no other form to agree on.
 class StateWriter {
  public:
   virtual ~StateWriter() = default;
@@ -26,24 +27,13 @@ class StateWriter {
   void value(const T& v) { put(&v, sizeof v); }
   template <class T>
   requires std::is_trivially_copyable_v<T>
-  void values(const std::vector<T>& v) {
+  void value(const std::vector<T>& v) {
     value(static_cast<std::uint64_t>(v.size()));
     put(v.data(), v.size() * sizeof(T));
   }
   void text(std::string_view s) {
     value(static_cast<std::uint64_t>(s.size()));
     put(s.data(), s.size());
-  }
-  /// Any of them, so that one list of members serves writing and reading.
-  template <class T>
-  void operator()(const T& v) {
-    if constexpr (requires {
-                    typename T::value_type;
-                    v.data();
-                  })
-      values(v);
-    else
-      value(v);
   }
 
  protected:
@@ -67,23 +57,13 @@ class StateReader {
   }
   template <class T>
   requires std::is_trivially_copyable_v<T>
-  void values(std::vector<T>& v) {
+  void value(std::vector<T>& v) {
     const auto count = value<std::uint64_t>();
     if (count > m_left / sizeof(T)) fail();
     v.resize(static_cast<std::size_t>(count));
     get(v.data(), count, sizeof(T));
   }
   std::string text();
-  template <class T>
-  void operator()(T& v) {
-    if constexpr (requires {
-                    typename T::value_type;
-                    v.data();
-                  })
-      values(v);
-    else
-      value(v);
-  }
   bool atEnd() const { return m_left == 0; }
   [[noreturn]] void fail() const;
 
@@ -147,7 +127,6 @@ class Checkpoint {
  private:
   using Clock = std::chrono::steady_clock;
   std::filesystem::path fileOf(const std::string& part) const;
-  void drop();
 
   std::filesystem::path m_folder;
   double m_interval;

@@ -18,6 +18,7 @@ enum class RandomStream : std::uint32_t {
   particles = 4,
   merge = 5,
   importance = 6,
+  visibility = 7,
   test = 99,
 };
 

@@ -26,7 +26,6 @@ namespace {
 struct Options {
   SceneOptions scene;
   std::optional<double> targetError, timeLimit;
-  bool targetMissed = false;  // by some frame
   std::string output, crop, compression = "zip";
   scene::WriteRequest write;
 };
@@ -50,8 +49,10 @@ std::optional<render::Crop> parseCrop(const std::string& text) {
   return crop;
 }
 
-void renderOne(const scene::SceneFile& scene, std::int64_t frame, Options& options,
-               const scene::RenderRequest& request, StatsFile& stats) {
+// @return false where target_error was missed
+bool renderOne(const scene::SceneFile& scene, std::int64_t frame, Options& options,
+               const scene::RenderRequest& request, const scene::FrameWriter& writer,
+               StatsFile& stats) {
   checkWritable(framePath(options.write.path, frame));
   checkWritable(framePath(options.write.preview, frame));
   checkWritable(framePath(options.scene.stats, frame));
@@ -60,16 +61,17 @@ void renderOne(const scene::SceneFile& scene, std::int64_t frame, Options& optio
   for (const std::string& note : result.notes)
     log::info("frame {}: {}", frame, note);
   const InterruptDelay delay;  // what is rendered is written
-  scene::writeFrame(result, scene, options.write);
+  writer.write(result);
   const scene::FrameStatistics& s = result.statistics;
   const std::string path = framePath(options.write.path, frame);
   printLine("frame {}: {}  mean {:.6g}, max {:.6g}  {}  peak {}", frame, path, s.imageMean,
             s.imageMax, formatSeconds(s.seconds), formatBytes(s.peakMemoryBytes));
   stats.add(frame, path, s);
-  options.targetMissed = options.targetMissed || s.targetMissed;
+  return !s.targetMissed;
 }
 
-int renderFrames(const scene::SceneFile& scene, Options& options) {
+int renderFrames(const scene::SceneFile& scene, const scene::FrameWriter& writer,
+                 Options& options) {
   const std::vector<std::int64_t> frames = sceneFrameList(scene, options.scene);
   checkOutputPattern(options.write.path, frames.size());
   if (!options.write.preview.empty()) checkOutputPattern(options.write.preview, frames.size());
@@ -78,8 +80,9 @@ int renderFrames(const scene::SceneFile& scene, Options& options) {
   empty.volumes.clear();
   StatsFile stats(options.scene.stats, frames.size());
   bool planned = false;
-  ResumableJob job =
-      resumableJob(scene, options.scene, "render " + options.crop, frames, options.write.path);
+  const std::string more =
+      fmt::format("render {} {} {}", options.crop, options.write.floatColor, options.compression);
+  ResumableJob job = resumableJob(scene, options.scene, more, frames, options.write.path);
   const auto render = [&](std::int64_t frame) {
     const std::string path = framePath(options.write.path, frame);
     if (options.scene.frames.skipExisting && image::exrIsComplete(path))
@@ -99,12 +102,12 @@ int renderFrames(const scene::SceneFile& scene, Options& options) {
       return printLine("frame {}: {} was finished before the interruption", frame, path);
     }
     request.checkpoint = &job.begin(frame);
-    renderOne(smoke ? scene : empty, frame, options, request, stats);
-    job.finished(frame);
+    const bool reached = renderOne(smoke ? scene : empty, frame, options, request, writer, stats);
+    job.finished(frame, !reached);
   };
   const int code =
       job.run([&] { return runFrames(frames, options.scene.frames.keepGoing, render); });
-  if (code != static_cast<int>(ExitCode::ok) || !options.targetMissed) return code;
+  if (code != static_cast<int>(ExitCode::ok) || !job.missed()) return code;
   return static_cast<int>(ExitCode::accuracy);
 }
 
@@ -124,8 +127,7 @@ int runRender(Options& options) {
   options.write.path = chooseOutput(scene, options.output);
   if (options.write.preview.empty())
     options.write.preview = scene.resolvePath(scene.output.text("preview"));
-  scene::checkWriteRequest(scene, options.write);
-  return renderFrames(scene, options);
+  return renderFrames(scene, scene::FrameWriter(scene, options.write), options);
 }
 
 std::string sceneHelp() {

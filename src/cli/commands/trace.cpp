@@ -23,7 +23,8 @@ namespace {
 
 struct Options {
   SceneOptions scene;
-  std::string output, shard;
+  std::string output, shardText;
+  std::optional<estimators::ShardNumber> shard;
 };
 
 std::optional<estimators::ShardNumber> parseShard(const std::string& text) {
@@ -55,13 +56,13 @@ int traceFrames(const scene::SceneFile& scene, const Options& options) {
   StatsFile stats(options.scene.stats, frames.size());
   bool planned = false;
   ResumableJob job =
-      resumableJob(scene, options.scene, "trace " + options.shard, frames, options.output);
+      resumableJob(scene, options.scene, "trace " + options.shardText, frames, options.output);
   const auto trace = [&](std::int64_t frame) {
     const std::string path = framePath(options.output, frame);
     if (options.scene.frames.skipExisting && vdbIsComplete(path))
       return printLine("frame {}: {} exists and is complete, skipped", frame, path);
     scene::RenderRequest request;
-    request.shard = parseShard(options.shard);
+    request.shard = options.shard;
     std::int64_t cacheFrame = frame;
     if (!cacheFrames.map(frame, cacheFrame))
       return printLine("frame {}: outside the caches' frames, no light to trace", frame);
@@ -81,13 +82,13 @@ int traceFrames(const scene::SceneFile& scene, const Options& options) {
   return job.run([&] { return runFrames(frames, options.scene.frames.keepGoing, trace); });
 }
 
-int runTrace(const Options& options) {
+int runTrace(Options& options) {
   const scene::SceneFile scene = openScene(options.scene);
   if (options.scene.dumpScene) {
     printLine("{}", scene::dumpScene(scene));
     return static_cast<int>(ExitCode::ok);
   }
-  parseShard(options.shard);
+  options.shard = parseShard(options.shardText);
   if (options.output.empty()) throw ConfigError("no output; give -o light.vdb");
   if (std::filesystem::path(options.output).extension() != ".vdb")
     throw ConfigError(options.output + ": a light cache is written as .vdb");
@@ -99,7 +100,7 @@ std::function<int()> declareTrace(CLI::App& app) {
   app.add_option("-o,--output", options->output, "Light cache to write, with #### for frames")
       ->type_name("LIGHT.vdb");
   addSceneOptions(app, options->scene);
-  app.add_option("--shard", options->shard,
+  app.add_option("--shard", options->shardText,
                  "Trace part i of n of the photons; `photosphere merge` adds the parts up")
       ->type_name("i/n");
   app.footer([] {
