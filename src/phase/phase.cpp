@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "photosphere/core/error.h"
@@ -129,6 +130,65 @@ bool PhaseFunction::operator==(const PhaseFunction& other) const {
   for (int i = 0; i < lobes(); ++i)
     if (lobe(i).g() != other.lobe(i).g() || lobe(i).alpha() != other.lobe(i).alpha()) return false;
   return true;
+}
+
+namespace {
+
+// Degrees beyond which moments are nothing, and how many are kept at the most.
+constexpr double kNothing = 1e-7;
+constexpr std::size_t kMostMoments = 4096;
+
+// Of x f, from those of f: x P_l = ((l + 1) P_{l+1} + l P_{l-1}) / (2 l + 1). One fewer.
+std::vector<double> timesCosine(const std::vector<double>& of) {
+  std::vector<double> out(of.size() - 1);
+  for (std::size_t l = 0; l < out.size(); ++l) {
+    const auto n = static_cast<double>(l);
+    out[l] = ((n + 1) * of[l + 1] + (l > 0 ? n * of[l - 1] : 0.0)) / (2 * n + 1);
+  }
+  return out;
+}
+
+std::vector<double> lobeMoments(const Draine& lobe, std::size_t count) {
+  std::vector<double> moments(count + 2);
+  double power = 1.0;
+  for (double& m : moments) {
+    m = power;
+    power *= lobe.g();
+  }
+  if (lobe.alpha() > 0) {
+    const std::vector<double> squared = timesCosine(timesCosine(moments));
+    const double norm = 1.0 + lobe.alpha() * squared[0];
+    for (std::size_t l = 0; l < count; ++l)
+      moments[l] = (moments[l] + lobe.alpha() * squared[l]) / norm;
+  }
+  moments.resize(count);
+  return moments;
+}
+
+}  // namespace
+
+std::vector<double> legendreMoments(const PhaseFunction& phase) {
+  double sharpest = 0;
+  for (int i = 0; i < phase.lobes(); ++i)
+    sharpest = std::max(sharpest, std::abs(phase.lobe(i).g()));
+  // cos^2 moves what is left of a power of g by two degrees.
+  const double degrees = sharpest > 0 ? 4 + std::log(kNothing) / std::log(sharpest) : 4;
+  const bool cut = !(degrees < static_cast<double>(kMostMoments));
+  const std::size_t count = cut ? kMostMoments : static_cast<std::size_t>(degrees);
+  std::vector<double> sum(count, 0.0);
+  for (int i = 0; i < phase.lobes(); ++i) {
+    const std::vector<double> part = lobeMoments(phase.lobe(i), count);
+    for (std::size_t l = 0; l < count; ++l)
+      sum[l] += phase.weight(i) * part[l];
+  }
+  if (cut)  // what is cut off would ring
+    for (std::size_t l = 0; l < count; ++l) {
+      const double x = 4.0 * static_cast<double>(l) / static_cast<double>(count);
+      sum[l] *= std::exp(-0.5 * x * x);
+    }
+  while (sum.size() > 1 && std::abs(sum.back()) < kNothing)
+    sum.pop_back();
+  return sum;
 }
 
 }  // namespace photosphere::phase

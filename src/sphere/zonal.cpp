@@ -9,7 +9,6 @@ namespace photosphere::sphere {
 
 namespace {
 
-constexpr std::size_t kMaxDegree = 4096;
 constexpr double kNothing = 1e-7;
 
 // Moments of `value(angle)` on [0, end]: 2 pi * integral of value P_l(cos t) sin t dt, composite
@@ -48,29 +47,6 @@ std::size_t significant(const LegendreMoments& moments) {
 }
 
 }  // namespace
-
-LegendreMoments phaseMoments(const std::function<double(const Vec3f& w, const Vec3f& wo)>& phase) {
-  const auto value = [&](double t) {
-    return phase(Vec3f(0, 0, 1), Vec3f(Vec3d(std::sin(t), 0, std::cos(t))));
-  };
-  for (std::size_t count = 64;; count *= 2) {
-    LegendreMoments moments =
-        integrateMoments(count, kPi, std::max<std::size_t>(count, 256), value);
-    const double scale = moments[0] > 0 ? 1.0 / moments[0] : 0.0;
-    for (double& m : moments)
-      m *= scale;
-    moments[0] = 1.0;
-    const bool ended = significant(moments) < count;
-    if (!ended && count < kMaxDegree) continue;
-    if (!ended)
-      for (std::size_t l = 0; l < count; ++l) {
-        const double x = 4.0 * static_cast<double>(l) / static_cast<double>(count);
-        moments[l] *= std::exp(-0.5 * x * x);
-      }
-    moments.resize(significant(moments));
-    return moments;
-  }
-}
 
 LegendreMoments kernelMoments(const SmoothingKernel& kernel, std::size_t count) {
   if (!kernel.acts()) return LegendreMoments(count, 1.0);

@@ -173,14 +173,14 @@ class Follower {
     m_stats.scatterings += event.scattered ? 1 : 0;
     flight.scatterings += event.scattered ? 1 : 0;
     ++flight.ordinal;
-    if (flight.scatterings > kLongPath) {
+    if (event.scattered && isLongPath(flight.scatterings)) {
       const Vec3d whole(flight.power);
-      if (!(rng.uniform() < 0.999f)) {
+      if (!(rng.uniform() < 0.5f)) {
         m_stats.cappedPower += whole;
         ++m_stats.capped;
         return false;
       }
-      flight.power *= 1.0f / 0.999f;
+      flight.power *= 2.0f;
       m_stats.cappedPower += whole - Vec3d(flight.power);
     }
     flight.origin = point;

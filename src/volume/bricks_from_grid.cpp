@@ -7,6 +7,7 @@
 #include "photosphere/core/error.h"
 #include "photosphere/core/resources.h"
 #include "photosphere/volume/bricks.h"
+#include "photosphere/volume/invalid_values.h"
 
 namespace photosphere::volume {
 
@@ -29,17 +30,13 @@ double componentOf(const ValueT& value, int c) {
     return static_cast<double>(value);
 }
 
-// Checks every active value once, tile by tile, before any is sampled.
-template <class GridT>
-void checkValues(const GridT& grid, int c, const std::string& path, bool allowNegative) {
-  for (auto it = grid.cbeginValueOn(); it; ++it) {
-    const double v = componentOf(it.getValue(), c);
-    if (std::isfinite(v) && (allowNegative || v >= 0) && std::abs(v) <= 3e38) continue;
-    const openvdb::Coord at = it.getCoord();
-    throw InputError(path, fmt::format("grid '{}' holds {} at voxel ({}, {}, {}); clean the cache "
-                                       "(`photosphere inspect` counts such voxels)",
-                                       grid.getName(), v, at.x(), at.y(), at.z()));
-  }
+void checkValues(const Grid& grid, const std::string& path, bool allowNegative) {
+  const InvalidValues found = findInvalid(grid, !allowNegative);
+  if (found.total() == 0) return;
+  throw InputError(path, fmt::format("grid '{}' holds {} at voxel ({}, {}, {}); clean the cache "
+                                     "(`photosphere inspect` counts such voxels)",
+                                     grid.name(), found.firstValue, found.first.x, found.first.y,
+                                     found.first.z));
 }
 
 // The bricks that a box of nodes touches: node i belongs to cells i-1 and i.
@@ -118,7 +115,7 @@ Field bricksFromGrid(const Grid& grid, int component, const std::string& path, b
                      std::uint64_t budgetBytes, const ValueScale& scale) {
   Field field;
   const bool known = grid.base()->apply<Supported>([&](const auto& typed) {
-    checkValues(typed, component, path, allowNegative);
+    if (!scale.checked) checkValues(grid, path, allowNegative);
     field = build<float>(typed, path, budgetBytes, [&](const auto& value) {
       return static_cast<float>(std::min(componentOf(value, component) * scale.factor, scale.most));
     });
@@ -136,8 +133,7 @@ BrickField<Vec4f> vectorBricksFromGrid(const Grid& grid, const std::string& path
   BrickField<Vec4f> field;
   const bool known =
       grid.base()->apply<openvdb::TypeList<openvdb::Vec3SGrid>>([&](const auto& typed) {
-        for (int c = 0; c < 3; ++c)
-          checkValues(typed, c, path, true);
+        checkValues(grid, path, true);
         field = build<Vec4f>(typed, path, budgetBytes, [](const openvdb::Vec3f& v) {
           return Vec4f(v.x(), v.y(), v.z(), 0.0f);
         });

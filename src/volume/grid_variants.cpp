@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <bit>
 #include <cmath>
 #include <string>
 
@@ -45,7 +47,54 @@ Grid converted(const openvdb::FloatGrid& from) {
   return Grid(to);
 }
 
+constexpr int kLeastVoxels = 64;  // along the shortest edge, in larger voxels
+
+// How many voxels a larger one spans along an edge; 1 = the grid stays.
+template <class GridT>
+int largerVoxel(const GridT& grid) {
+  if (grid.tree().leafCount() > 0 || grid.empty()) return 1;
+  const openvdb::Coord extent = grid.evalActiveVoxelBoundingBox().dim();
+  int most = std::min({extent.x(), extent.y(), extent.z()}) / kLeastVoxels;
+  for (auto tile = grid.cbeginValueOn(); tile; ++tile) {
+    openvdb::CoordBBox box;
+    tile.getBoundingBox(box);
+    most = std::min(most, box.dim().x());
+  }
+  return most < 1 ? 1 : static_cast<int>(std::bit_floor(static_cast<unsigned>(most)));
+}
+
+template <class GridT>
+Grid merged(const GridT& from, int edge, bool cellCentered) {
+  const auto to = GridT::create();
+  for (auto tile = from.cbeginValueOn(); tile; ++tile) {
+    openvdb::CoordBBox box;
+    tile.getBoundingBox(box);
+    const auto larger = [&](const openvdb::Coord& c) {
+      const auto down = [&](int i) { return (i - (i % edge + edge) % edge) / edge; };
+      return openvdb::Coord(down(c.x()), down(c.y()), down(c.z()));
+    };
+    to->fill(openvdb::CoordBBox(larger(box.min()), larger(box.max())), *tile);
+  }
+  const double first = cellCentered ? 0.0 : 0.5 * (edge - 1);
+  const auto transform = from.transform().copy();
+  transform->preTranslate(openvdb::Vec3d(first));
+  transform->preScale(edge);
+  to->setTransform(transform);
+  to->setName(from.getName());
+  to->setGridClass(from.getGridClass());
+  return Grid(to);
+}
+
 }  // namespace
+
+Grid tilesInLargerVoxels(const Grid& grid, bool cellCentered) {
+  Grid result = grid;
+  if (!grid) return result;
+  visitScalarGrid(*grid.base(), [&](const auto& typed) {
+    if (const int edge = largerVoxel(typed); edge > 1) result = merged(typed, edge, cellCentered);
+  });
+  return result;
+}
 
 Grid ofType(const Grid& grid, std::string_view type) {
   const openvdb::FloatGrid& from = floats(grid);

@@ -45,11 +45,15 @@ Fault worstFault(const Value& value, bool negatives, double& bad, double& larges
   }
 }
 
-template <class Visit>
-void visitValues(const Grid& grid, const Visit& visit) {
-  if (!grid) throw InputError("grid", "is missing");
-  if (!visitScalarGrid(*grid.base(), visit) && !visitVectorGrid(*grid.base(), visit))
+// @param base  of the grid, or of a copy of it
+template <class Base, class Visit>
+void visitValues(const Grid& grid, Base& base, const Visit& visit) {
+  if (!visitScalarGrid(base, visit) && !visitVectorGrid(base, visit))
     throw InputError(describe(grid), "has no scalar or vector values");
+}
+
+void checkThere(const Grid& grid) {
+  if (!grid) throw InputError("grid", "is missing");
 }
 
 }  // namespace
@@ -63,7 +67,8 @@ std::string InvalidValues::text() const {
 
 InvalidValues findInvalid(const Grid& grid, bool negatives) {
   InvalidValues found;
-  visitValues(grid, [&](const auto& typed) {
+  checkThere(grid);
+  visitValues(grid, *grid.base(), [&](const auto& typed) {
     for (auto it = typed.cbeginValueOn(); it; ++it) {
       double bad = 0;
       const Fault fault = worstFault(*it, negatives, bad, found.largest);
@@ -81,7 +86,7 @@ InvalidValues findInvalid(const Grid& grid, bool negatives) {
 }
 
 Grid withInvalidAsZero(const Grid& grid, bool negatives) {
-  if (!grid) throw InputError("grid", "is missing");
+  checkThere(grid);
   const openvdb::GridBase::Ptr copy = grid.base()->deepCopyGrid();
   const auto clean = [negatives]<class GridT>(GridT& typed) {
     using Value = typename GridT::ValueType;
@@ -91,11 +96,7 @@ Grid withInvalidAsZero(const Grid& grid, bool negatives) {
         it.setValue(openvdb::zeroVal<Value>());
     }
   };
-  using Types = openvdb::TypeList<openvdb::FloatGrid, openvdb::DoubleGrid, openvdb::Int32Grid,
-                                  openvdb::Int64Grid, openvdb::BoolGrid, openvdb::Vec3SGrid,
-                                  openvdb::Vec3DGrid, openvdb::Vec3IGrid>;
-  if (!copy->apply<Types>(clean))
-    throw InputError(describe(grid), "has no scalar or vector values");
+  visitValues(grid, *copy, clean);
   return Grid(copy);
 }
 

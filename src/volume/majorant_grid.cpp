@@ -33,6 +33,15 @@ MajorantGrid::MajorantGrid(std::span<const MajorantSource> sources, const Walked
   m_maximum = *std::max_element(m_values.begin(), m_values.end());
 }
 
+double MajorantGrid::shareAbove(float extinction) const {
+  std::size_t smoke = 0, above = 0;
+  for (const float majorant : m_values) {
+    smoke += majorant > 0.0f;
+    above += majorant > extinction;
+  }
+  return smoke ? static_cast<double>(above) / static_cast<double>(smoke) : 0.0;
+}
+
 // Raises every coarse cell that a voxel cell of this source overlaps to the sum of what was there
 // before this source and the source's own maximum over the cell.
 void MajorantGrid::splat(const MajorantSource& source) {

@@ -34,17 +34,17 @@ openvdb::math::Transform::Ptr makeTransform(const Mat4d& worldFromIndex);
 
 /// Calls `f` with the grid as its own type when it holds bool, float, double, int32 or int64.
 /// @return false when it does not
-template <class F>
-bool visitScalarGrid(const openvdb::GridBase& grid, F&& f) {
+template <class Base, class F>
+bool visitScalarGrid(Base& grid, F&& f) {
   using Types = openvdb::TypeList<openvdb::FloatGrid, openvdb::DoubleGrid, openvdb::BoolGrid,
                                   openvdb::Int32Grid, openvdb::Int64Grid>;
-  return grid.apply<Types>(f);
+  return grid.template apply<Types>(f);
 }
 /// The same for vectors of floats, doubles or integers.
-template <class F>
-bool visitVectorGrid(const openvdb::GridBase& grid, F&& f) {
+template <class Base, class F>
+bool visitVectorGrid(Base& grid, F&& f) {
   using Types = openvdb::TypeList<openvdb::Vec3SGrid, openvdb::Vec3DGrid, openvdb::Vec3IGrid>;
-  return grid.apply<Types>(f);
+  return grid.template apply<Types>(f);
 }
 
 /// `float grid "density"` for messages.

@@ -200,10 +200,6 @@ class Rasterizer {
   std::vector<Visit> m_visits;
 };
 
-}  // namespace
-
-namespace {
-
 // A particle that is far larger than most would make voxels so large that the others vanish.
 void checkRadii(const RasterizeResult& result) {
   // Its kernel in voxels of half the median radius would be 2^28 of them and more.

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 #include <openvdb/io/File.h>
 
+#include <algorithm>
 #include <cmath>
 #include <new>
 
@@ -17,8 +18,13 @@ namespace photosphere::volume {
 namespace {
 
 // A leaf of 512 voxels takes 2 to 12 KiB in memory and at least 130 bytes in the file. The walk has
-// counted the nodes; what points claim to hold, nothing has.
-constexpr std::uint64_t kLargestRatio = 128, kRoom = std::uint64_t(256) << 20;
+// counted the nodes; what points claim to hold, nothing has, and equal points pack into a 255th
+// (LZ4, which blosc uses), of which reading holds up to three copies.
+constexpr std::uint64_t kLargestRatio = 1024, kRoom = std::uint64_t(256) << 20;
+
+std::uint64_t roomFor(std::uint64_t fileSize) {
+  return std::max(kRoom, std::min(kRoom + kLargestRatio * fileSize, availableMemoryBytes()));
+}
 
 void load(const VdbContents& contents, VdbFile& result) {
   openvdb::io::File file(result.path);
@@ -68,7 +74,7 @@ VdbFile readVdb(const std::filesystem::path& path) {
   result.path = path.string();
   try {
     const CrashGuard guard(path);
-    const AddressRoom room(kRoom + kLargestRatio * contents.fileSize);
+    const AddressRoom room(roomFor(contents.fileSize));
     load(contents, result);
     checkTransforms(result);
   } catch (const Error&) {

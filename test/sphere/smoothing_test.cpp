@@ -16,10 +16,12 @@ double henyeyGreenstein(double g, double cosine) {
   return (1 - g * g) / (4 * kPi * std::pow(1 + g * g - 2 * g * cosine, 1.5));
 }
 
-std::function<double(const Vec3f&, const Vec3f&)> phaseOf(double g) {
-  return [g](const Vec3f& w, const Vec3f& wo) {
-    return henyeyGreenstein(g, glm::dot(Vec3d(w), Vec3d(wo)));
-  };
+// Henyey-Greenstein's, up to where they are nothing.
+LegendreMoments momentsOf(double g) {
+  LegendreMoments moments{1.0};
+  for (double m = g; std::abs(m) >= 1e-7; m *= g)
+    moments.push_back(m);
+  return moments;
 }
 
 // Unit direction at an angle from +z.
@@ -92,7 +94,7 @@ TEST_P(Kernels, ConvolveWithAPhaseFunction) {
   const auto [kind, bandwidth, truncation] = GetParam();
   const SmoothingKernel kernel(kind, bandwidth, truncation);
   const double g = 0.6;
-  const LegendreMoments phase = phaseMoments(phaseOf(g));
+  const LegendreMoments phase = momentsOf(g);
   const ZonalTable table(convolved(phase, kernelMoments(kernel, phase.size())));
   const Partition points(150);
   for (const double angle : {0.0, 0.3, 1.2, 2.5, kPi}) {
@@ -177,12 +179,9 @@ TEST(Kernel, RefusesWhatHasNoArea) {
   EXPECT_FALSE(SmoothingKernel(AngularKernel::none, 0, 0).acts());
 }
 
-TEST(Moments, OfHenyeyGreensteinArePowersOfG) {
-  for (const double g : {0.0, 0.4, -0.7, 0.9, 0.98}) {
-    const auto moments = phaseMoments(phaseOf(g));
-    for (std::size_t l = 0; l < moments.size(); ++l)
-      ASSERT_NEAR(moments[l], std::pow(g, static_cast<double>(l)), 2e-6) << g << ' ' << l;
-    const ZonalTable table(moments);
+TEST(ZonalTables, HaveTheFunctionThatTheirMomentsAreOf) {
+  for (const double g : {0.0, 0.4, -0.7, 0.9, 0.98, 0.99}) {
+    const ZonalTable table(momentsOf(g));
     for (double t = 0; t <= kPi; t += 0.01) {
       const double exact = henyeyGreenstein(g, std::cos(t));
       ASSERT_NEAR(static_cast<double>(table.atAngle(static_cast<float>(t))), exact,
@@ -194,7 +193,7 @@ TEST(Moments, OfHenyeyGreensteinArePowersOfG) {
 
 // Any kernel leaves an isotropic phase function as it is, to the last bit.
 TEST(Moments, IsotropicStaysIsotropic) {
-  const auto phase = phaseMoments(phaseOf(0));
+  const auto phase = momentsOf(0);
   EXPECT_EQ(phase.size(), 1u);
   const SmoothingKernel kernel(AngularKernel::gaussian, 0.5, 3);
   const ZonalTable table(convolved(phase, kernelMoments(kernel, phase.size())));
@@ -204,7 +203,7 @@ TEST(Moments, IsotropicStaysIsotropic) {
 
 TEST(Lobes, ConvolveToHenyeyGreenstein) {
   for (const double g : {0.0, 0.5, -0.6, 0.9}) {
-    const LobeTable lobes(phaseMoments(phaseOf(g)));
+    const LobeTable lobes(momentsOf(g));
     for (const double r : {0.0, 0.2, 0.77, 0.95, 1.0})
       for (const double t : {0.0, 0.2, 1.0, 2.0, kPi}) {
         const double exact = henyeyGreenstein(g * r, std::cos(t));

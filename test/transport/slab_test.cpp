@@ -115,6 +115,23 @@ TEST(PhotonTracer, ColouredPowersAddUp) {
   EXPECT_GT(stats.absorbed.z / stats.emitted.z, 2 * stats.absorbed.x / stats.emitted.x);
 }
 
+// Most of these photons leave after more than kLongPath scatterings: those that are not ended then
+// carry the power of those that are.
+TEST(PhotonTracer, LongPathsKeepTheirPower) {
+  const transport::Medium medium = slabMedium(700, 1.0, 0.0);
+  transport::LightList lights;
+  lights.push_back(std::make_unique<InjectionLight>(0.0, false));
+  LeaveCounter sink;
+  transport::TraceOptions options;
+  options.photons = kSanitized ? 8 : 160;
+  options.key = RandomKey::fromSeed(5, 0);
+  const transport::TraceStatistics stats = tracePhotons(medium, lights, options, sink);
+  EXPECT_GT(stats.capped, 0u);
+  EXPECT_NEAR(stats.imbalance().x, 0.0, 1e-9);
+  // Spread of one photon's power about 1; without the twofold power 0.6 would be left.
+  EXPECT_NEAR(stats.escaped.x, 1.0, 4.0 / std::sqrt(static_cast<double>(options.photons)));
+}
+
 std::vector<SlabCase> cases() {
   std::vector<SlabCase> all;
   for (const SlabRow& row : slabTable())

@@ -205,5 +205,23 @@ TEST(DenseRoundTrip, RefusesTheWrongNumberOfValues) {
   EXPECT_THROW(denseToGrid("d", Vec3i(2), std::vector<float>(8), Mat4d(0)), ConfigError);
 }
 
+// Equal points pack into a 255th of what they are, which must not look like a file that lies.
+TEST(PointsRoundTrip, ThoseThatPackIntoNextToNothing) {
+  if (test::kSanitized) GTEST_SKIP() << "memory has no bound under a sanitizer";
+  constexpr std::size_t count = 6'000'000;
+  const test::TemporaryFolder folder;
+  const auto path = folder / "equal.vdb";
+  {
+    ParticleSet set;
+    set.positions.assign(count, Vec3d(0.0));
+    set.add({"v", 3, std::vector<float>(3 * count, 1.0f)});
+    writeVdb(path, {pointsToGrid(set, "points", 1)});
+  }
+  ASSERT_LT(std::filesystem::file_size(path), count / 4);
+  const VdbFile file = readVdb(path);
+  ASSERT_NE(file.points(), nullptr);
+  EXPECT_EQ(gridToPoints(*file.points()).size(), count);
+}
+
 }  // namespace
 }  // namespace photosphere::volume

@@ -3,6 +3,7 @@
 
 #include <span>
 #include <string_view>
+#include <vector>
 
 #include "photosphere/core/param.h"
 #include "photosphere/core/sampling.h"
@@ -141,6 +142,11 @@ class PhaseFunction {
   Draine m_first, m_second;
   double m_weight = 0.0;  // of the second
 };
+
+/// Legendre moments, the integrals over the sphere of the phase function times P_l(cos), from
+/// degree 0, which is 1, to the last that is not nothing (1e-7). Those of Henyey-Greenstein's
+/// function are g^l. Lobes narrower than about 1e-3 rad are widened to that.
+std::vector<double> legendreMoments(const PhaseFunction& phase);
 
 /// One phase model of the table.
 struct PhasePlugin {

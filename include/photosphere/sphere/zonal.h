@@ -1,7 +1,6 @@
 #pragma once
 // Functions of the angle between two directions, and their convolution over the sphere.
 
-#include <functional>
 #include <vector>
 
 #include "photosphere/core/types.h"
@@ -14,10 +13,6 @@ namespace photosphere::sphere {
 /// function stays the same whatever it is convolved with.
 using LegendreMoments = std::vector<double>;
 
-/// Moments of a phase function [1/sr] that depends on the angle alone, scaled to f_0 = 1, up to
-/// the degree beyond which they are nothing (1e-7). Lobes narrower than about 1e-3 rad are widened
-/// to that.
-LegendreMoments phaseMoments(const std::function<double(const Vec3f& w, const Vec3f& wo)>& phase);
 /// Moments of a kernel, `count` of them; all 1 for `none`.
 LegendreMoments kernelMoments(const SmoothingKernel& kernel, std::size_t count);
 /// Moments of the convolution of two functions.

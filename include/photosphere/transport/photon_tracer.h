@@ -3,6 +3,7 @@
 // photons of equal power, each flies, collides, is absorbed or scattered by Russian roulette, one
 // direction per event.
 
+#include <bit>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -77,9 +78,16 @@ struct TraceOptions {
   std::function<void(const TraceProgress&)> pause;
 };
 
-/// Events after which a path must pass a roulette of survival 0.999 at each further one (METHOD,
-/// section 6): unbiased, and ends paths that albedo 1 would never end.
-inline constexpr std::uint32_t kLongPath = 10'000;
+/// Scatterings after which a path goes on by chance. From here on every second one ends whenever
+/// their number has doubled, and the other carries twice the power: unbiased, ends paths that
+/// albedo 1 would never end, and leaves those that cross a slab of optical depth 1000, after some
+/// hundred thousand, few enough doublings to be counted. (A roulette of survival 0.999 at every
+/// event, METHOD.md section 6, leaves none of them.)
+inline constexpr std::uint32_t kLongPath = 100'000;
+inline bool isLongPath(std::uint32_t scatterings) {
+  return scatterings >= kLongPath && scatterings % kLongPath == 0 &&
+         std::has_single_bit(scatterings / kLongPath);
+}
 
 /// Traces photons of all lights and of the medium's emission, chosen in proportion to their power,
 /// and hands every flight to the sink. Deterministic in everything but the order in which batches

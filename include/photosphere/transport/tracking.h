@@ -47,6 +47,9 @@ struct Collision {
   bool happened() const { return distance < kInfinity; }
 };
 
+/// Parts of a distance along a ray below which floats do not tell two places apart.
+inline constexpr float kDistanceResolution = 0x1p-21f;
+
 /// A length in which optical depth grows by at most `depth`, from where extinction is sigma and
 /// rises by no more than `slope` [1/m^2].
 inline float thinPart(float sigma, float slope, float depth) {
@@ -60,34 +63,36 @@ inline float thinPart(float sigma, float slope, float depth) {
 template <class Along>
 inline float extinctionOnward(const Along& extinction, float t, float spacing) {
   constexpr float kLittle = 0x1p-10f;
-  return glm::max(extinction(t), extinction(t + glm::max(kLittle * spacing, 0x1p-21f * t)));
+  return glm::max(extinction(t),
+                  extinction(t + glm::max(kLittle * spacing, kDistanceResolution * t)));
 }
 
 /// A cell so thick that a walk past the edge of its smoke would draw many collisions that are none
 /// is walked in parts, each with a majorant of its own: extinction where the part begins, plus what
 /// it can rise by on the way (Medium::steepness). Their number grows with the root of the depth.
-/// @param t    where the walk is, inside the cell
-/// @param tau  optical depth to the next tentative collision, carried on from part to part
+/// @param t          where the walk is, inside the cell
+/// @param steepness  Medium::steepness [1/m]
+/// @param tau        optical depth to the next tentative collision, carried on from part to part
 /// @return false when `visit` did
 template <class Along, class Visit>
-inline bool walkThickCell(const Along& extinction, float t, float end, float majorant, float slope,
-                          float& tau, Rng& rng, TrackingCounters& counters, const Visit& visit) {
-  constexpr float kPartDepth = 2.0f;       // of a part that begins in thin smoke
-  constexpr float kWholeDepth = 16.0f;     // of one near the cell's own majorant
-  constexpr float kResolution = 0x1p-21f;  // of distances, as a part of them
+inline bool walkThickCell(const Along& extinction, float t, float end, float majorant,
+                          float steepness, float& tau, Rng& rng, TrackingCounters& counters,
+                          const Visit& visit) {
+  constexpr float kPartDepth = 2.0f;    // of a part that begins in thin smoke
+  constexpr float kWholeDepth = 16.0f;  // of one near the cell's own majorant
+  const float slope = majorant * steepness, spacing = 1.0f / steepness;
   while (t < end) {
-    const float sigma = extinctionOnward(extinction, t, majorant / slope);
+    const float sigma = extinctionOnward(extinction, t, spacing);
     counters.lookups += 2;
     float part = kWholeDepth / majorant, bound = majorant;
     if (sigma < 0.25f * majorant) {
-      part = glm::max(thinPart(sigma, slope, kPartDepth), kResolution * t);
+      part = glm::max(thinPart(sigma, slope, kPartDepth), kDistanceResolution * t);
       // Faces are steeper than that: one that lies within the part shows at its end.
-      bound =
-          glm::max(sigma + slope * part, extinctionOnward(extinction, t + part, majorant / slope));
+      bound = glm::max(sigma + slope * part, extinctionOnward(extinction, t + part, spacing));
       bound = glm::min(majorant, bound * 1.0001f);
       counters.lookups += 2;
     }
-    const float stop = glm::min(end, t + glm::max(part, kResolution * t));
+    const float stop = glm::min(end, t + glm::max(part, kDistanceResolution * t));
     while (true) {
       const float available = (stop - t) * bound;
       if (!(tau < available)) {
@@ -126,8 +131,8 @@ inline void forEachTentative(const Medium& medium, const Vec3f& o, const Vec3f& 
     float t = walk.begin();
     if constexpr (std::is_same_v<When, Still>)
       if (majorant > thick) {
-        if (!walkThickCell(extinction, t, end, majorant, majorant * medium.steepness(), tau, rng,
-                           counters, visit))
+        if (!walkThickCell(extinction, t, end, majorant, medium.steepness(), tau, rng, counters,
+                           visit))
           return;
         continue;
       }

@@ -184,6 +184,7 @@ void forEachCell(const BrickField<T>& field, const Visit& visit) {
 struct ValueScale {
   double factor = 1.0;
   double most = std::numeric_limits<double>::infinity();  ///< after `factor`; larger ones are cut
+  bool checked = false;  ///< findInvalid has found nothing: the values are not looked through again
 };
 
 /// A scalar grid, or one component of a vector grid, as bricks. Inactive voxels count as zero.

@@ -21,4 +21,11 @@ Grid constantGrid(std::string_view name, const Box3i& box, float value,
 /// @throws InputError for a grid that is no float grid
 Grid inFrustum(const Grid& grid);
 
+/// A scalar grid that consists of tiles alone, in the largest voxels that hold the same box or
+/// boxes: no larger than its smallest tile, nor than a 64th of its shortest edge, so that the ramp
+/// of one voxel at its faces stays thin. Any other grid is returned as it is. What is made per
+/// voxel (bricks, light, shadows) would take hours for a tile of 4096^3.
+/// @param cellCentered  voxel i spans i to i + 1; else i - 1/2 to i + 1/2
+Grid tilesInLargerVoxels(const Grid& grid, bool cellCentered);
+
 }  // namespace photosphere::volume

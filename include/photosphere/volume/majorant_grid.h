@@ -53,6 +53,8 @@ class MajorantGrid {
   std::size_t size() const { return m_values.size(); }
   /// Largest majorant [1/m].
   float maximum() const { return m_maximum; }
+  /// Share of the cells that are not empty whose majorant is more than `extinction` [0, 1].
+  double shareAbove(float extinction) const;
   std::uint64_t memoryBytes() const { return m_values.size() * sizeof(float); }
 
   /// Walks the cells along a ray in order.
