@@ -112,9 +112,16 @@ void VoxelSink::depositTrack(const B& basis, const typename B::Along& along, con
                    // Where a voxel is entered, not how many came before: bits of rounding do not
                    // depend on which of them are stored.
                    std::uint32_t counter = std::bit_cast<std::uint32_t>(entry);
-                   const Vec3f middle = flight.origin + flight.direction * (entry + 0.5f * length);
-                   m_carriers.add(basis, along, flight, voxel, set, flight.power * length, middle,
-                                  counter);
+                   Vec3f at = flight.origin + flight.direction * (entry + 0.5f * length);
+                   Rgb amount = flight.power * length;
+                   if (m_weight) {
+                     // At a random place of the way: the weight may change along it.
+                     const float part = m_carriers.uniform(flight, counter);
+                     at = flight.origin + flight.direction * (entry + part * length);
+                     amount *= m_weight->at(voxel, at);
+                     if (!(maxComponent(amount) > 0.0f)) return;
+                   }
+                   m_carriers.add(basis, along, flight, voxel, set, amount, at, counter);
                  });
 }
 
@@ -126,8 +133,9 @@ void VoxelSink::depositCollision(const B& basis, const typename B::Along& along,
   const std::int32_t voxel = m_lattice.number(Vec3i(glm::floor(cell)));
   if (voxel < 0) return;
   std::uint32_t counter = 0;
-  m_carriers.add(basis, along, flight, static_cast<std::size_t>(voxel), set,
-                 flight.power / flight.extinctionAtEnd, p, counter);
+  Rgb amount = flight.power / flight.extinctionAtEnd;
+  if (m_weight) amount *= m_weight->at(static_cast<std::size_t>(voxel), p);
+  m_carriers.add(basis, along, flight, static_cast<std::size_t>(voxel), set, amount, p, counter);
 }
 
 void ParticleSink::consume(std::span<const Flight> flights) {

@@ -7,6 +7,7 @@
 #include "directional_basis.h"
 #include "particle_index.h"
 #include "photosphere/estimators/light_field.h"
+#include "visible_weight.h"
 
 namespace photosphere::estimators {
 
@@ -45,6 +46,11 @@ class CarrierSums {
               const LightFieldLayout& layout, const View& view, RandomKey key, FixedSums& sums);
 
   const DirectionalBasis& basis() const { return m_basis; }
+  /// Uniform in [0, 1), of a flight's deposit.
+  float uniform(const transport::Flight& flight, std::uint32_t deposit) const {
+    return static_cast<float>(roundingBits(m_key, flight.photon, flight.ordinal, ~deposit) >> 8) *
+           0x1p-24f;
+  }
   int setOf(const transport::Flight& flight) const {
     return estimators::setOf(flight, m_wantsUnscattered);
   }
@@ -68,8 +74,10 @@ class CarrierSums {
 /// extinction at collisions.
 class VoxelSink final : public transport::FlightSink {
  public:
-  VoxelSink(CarrierSums carriers, Deposit deposit, const transport::SupportLattice& lattice)
-      : m_carriers(std::move(carriers)), m_deposit(deposit), m_lattice(lattice) {}
+  /// @param weight  of a place, which multiplies what is deposited there; nullptr = 1
+  VoxelSink(CarrierSums carriers, Deposit deposit, const transport::SupportLattice& lattice,
+            const VisibleWeight* weight = nullptr)
+      : m_carriers(std::move(carriers)), m_deposit(deposit), m_lattice(lattice), m_weight(weight) {}
   void consume(std::span<const transport::Flight> flights) override;
 
  private:
@@ -83,6 +91,7 @@ class VoxelSink final : public transport::FlightSink {
   CarrierSums m_carriers;
   Deposit m_deposit;
   const transport::SupportLattice& m_lattice;
+  const VisibleWeight* m_weight;
 };
 
 /// Deposits collisions on particles by eq. 7a or 7b.

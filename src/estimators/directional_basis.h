@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "photosphere/estimators/light_field.h"
+#include "photosphere/estimators/lobe.h"
 #include "photosphere/sphere/spherical_harmonics.h"
 
 namespace photosphere::estimators {
@@ -82,7 +83,8 @@ struct Harmonics {
   sphere::SphericalHarmonics harmonics;
 };
 
-/// The view basis: one value for each phase function, times that function toward the eye.
+/// The view basis: one value for each phase function, times that function toward the eye, smoothed
+/// by the layout's kernel over directions.
 struct TowardEye {
   static constexpr bool kSigned = false, kKeepsMeans = false;
   struct Along {};
@@ -90,23 +92,27 @@ struct TowardEye {
   template <class Visit>
   void at(const transport::Flight& flight, const Along&, const Vec3f& p, const Visit& visit) const {
     const Vec3f toEye = view.toEye(p);
-    const auto& phases = medium->phases();
-    for (int k = 0; k < count; ++k)
-      visit(k, phases[static_cast<std::size_t>(k)].evaluate(flight.direction, toEye));
+    for (std::size_t k = 0; k < lobes.size(); ++k)
+      visit(static_cast<int>(k), lobes[k].evaluate(flight.direction, toEye));
   }
 
-  const transport::Medium* medium;
+  std::vector<Lobe> lobes;  ///< by phase function
   View view;
-  int count;  ///< of phase functions
 };
 
 using DirectionalBasis = std::variant<NearestBin, SharedBins, WithMeans<NearestBin>,
                                       WithMeans<SharedBins>, Harmonics, TowardEye>;
 
-/// The basis that a layout asks for. `medium` must outlive it.
+/// The basis that a layout asks for.
 inline DirectionalBasis directionalBasis(const LightFieldLayout& layout,
                                          const transport::Medium& medium, const View& view) {
-  if (layout.basis == Basis::view) return TowardEye{&medium, view, layout.phases};
+  if (layout.basis == Basis::view) {
+    const sphere::SmoothingKernel kernel = layout.directionKernel();
+    TowardEye toward{{}, view};
+    for (const phase::PhaseFunction& phase : medium.phases())
+      toward.lobes.push_back(kernel.acts() ? tabulatedLobe(phase, kernel) : Lobe{phase, nullptr});
+    return toward;
+  }
   if (layout.basis == Basis::sphericalHarmonics)
     return Harmonics{sphere::SphericalHarmonics(layout.order)};
   const bool nearest = layout.direction == sphere::DirectionDeposit::nearest;

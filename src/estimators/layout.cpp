@@ -41,13 +41,13 @@ void checkLayout(const LightFieldLayout& l) {
   refuse(l.smoothing != Smoothing::twicing && (particles || l.evaluate == Evaluate::perStep),
          "'smoothing' other than \"twicing\" is of fluence on voxels, once for each view: it needs "
          "carrier = \"voxels\" and evaluate = \"per_view\"");
+  refuse(
+      l.smoothing == Smoothing::visible && l.basis != Basis::view,
+      "smoothing = \"visible\" weighs photons by what one camera sees: it needs basis = \"view\"");
   if (l.basis == Basis::view) {
     refuse(l.evaluate != Evaluate::perView,
            "evaluate = \"per_step\" reads directions at every step, and basis = \"view\" keeps "
            "none: choose \"histogram\" or \"spherical_harmonics\"");
-    refuse(smooths,
-           "'kernel' smooths directions, and basis = \"view\" keeps none: choose \"histogram\" or "
-           "\"spherical_harmonics\"");
   }
   if (l.basis != Basis::histogram) {
     refuse(l.direction != sphere::DirectionDeposit::nearest,

@@ -69,7 +69,10 @@ class Tracing {
                       transport::TraceOptions options) {
     const CarrierSums carriers(medium, lights, m_light.layout, view, options.key, m_sums);
     if (!m_light.layout.holdsPower()) {
-      VoxelSink sink(carriers, m_light.layout.deposit, m_light.lattice);
+      std::optional<VisibleWeight> weight;
+      if (weighsByTheEye(m_light.layout)) weight.emplace(medium, m_light.lattice, view);
+      VoxelSink sink(carriers, m_light.layout.deposit, m_light.lattice,
+                     weight ? &*weight : nullptr);
       return trace(medium, lights, options, sink);
     }
     const ParticleIndex index(m_light.particles, m_light.layout.depositRadius);
@@ -109,7 +112,7 @@ class Tracing {
     w.value(m_done);
     w.value(farPhotons());
     w.value(m_sums.overflows.load());
-    w.values(m_sums.sums);
+    w.value(m_sums.sums);
   }
 
   void resume() {
@@ -119,7 +122,7 @@ class Tracing {
     kept->value(m_farBefore);
     m_sums.overflows = kept->value<std::uint64_t>();
     const std::size_t size = m_sums.sums.size();
-    kept->values(m_sums.sums);
+    kept->value(m_sums.sums);
     if (m_sums.sums.size() != size) kept->fail();
     log::info("light goes on from {} photons", m_done.photons);
   }

@@ -8,9 +8,6 @@ PhaseReader::PhaseReader(const LightFieldLayout& layout, const transport::Medium
     : m_layout(layout), m_medium(medium), m_phase(phase) {
   if (layout.basis == Basis::view) return;
   const auto& function = medium.phases()[static_cast<std::size_t>(phase)];
-  const sphere::BinWeights::Phase plain = [&function](const Vec3f& w, const Vec3f& wo) {
-    return static_cast<double>(function.evaluate(w, wo));
-  };
   const bool smooths = layout.angularKernel != sphere::AngularKernel::none &&
                        layout.direction != sphere::DirectionDeposit::kernel;
   const bool restores = layout.evaluate == Evaluate::perStep && layout.merge == Merge::sampled;
@@ -23,7 +20,7 @@ PhaseReader::PhaseReader(const LightFieldLayout& layout, const transport::Medium
     return;
   }
   // Smoothing the light is smoothing the phase function: both convolve with the kernel.
-  sphere::LegendreMoments moments = sphere::phaseMoments(plain);
+  sphere::LegendreMoments moments = phase::legendreMoments(function);
   if (smooths)
     moments =
         sphere::convolved(moments, sphere::kernelMoments(layout.directionKernel(), moments.size()));

@@ -111,13 +111,9 @@ class CollisionSink final : public transport::FlightSink {
   std::uint64_t m_counts[2] = {0, 0};
 };
 
-std::shared_ptr<const sphere::ZonalTable> smoothed(const phase::PhaseFunction& phase,
-                                                   const sphere::SmoothingKernel& kernel) {
-  if (!kernel.acts() && phase.plain()) return nullptr;
-  const sphere::LegendreMoments moments = sphere::phaseMoments(
-      [&](const Vec3f& w, const Vec3f& wo) { return static_cast<double>(phase.evaluate(w, wo)); });
-  return std::make_shared<sphere::ZonalTable>(
-      sphere::convolved(moments, sphere::kernelMoments(kernel, moments.size())));
+// What is not one Henyey-Greenstein lobe is quicker to read from a table.
+Lobe lobeOf(const phase::PhaseFunction& phase, const sphere::SmoothingKernel& kernel) {
+  return kernel.acts() || !phase.plain() ? tabulatedLobe(phase, kernel) : Lobe{phase, nullptr};
 }
 
 std::unique_ptr<PhotonSet> makeSet(const PhotonColumns& photons, const PhotonMapLayout& layout) {
@@ -137,7 +133,7 @@ class Map final : public PhotonMap {
     m_sets.push_back(makeSet(sink.take(0), usable));
     if (layout.unscattered) m_sets.push_back(makeSet(sink.take(1), usable));
     for (const phase::PhaseFunction& phase : medium.phases())
-      m_lobes.push_back({phase, smoothed(phase, layout.directionKernel)});
+      m_lobes.push_back(lobeOf(phase, layout.directionKernel));
   }
 
   Inscatter at(const Vec3f& p, const Vec3f& wo, const Coefficients& c) const override {

@@ -7,6 +7,7 @@
 #include "per_step.h"
 #include "phase_reader.h"
 #include "photosphere/core/parallel.h"
+#include "visible_weight.h"
 #include "voxel_smoothing.h"
 
 namespace photosphere::estimators {
@@ -88,7 +89,8 @@ class ResolvedField final : public InscatterSource {
   ResolvedField(const Medium& medium, const LightField& field, const View& view, RandomKey key)
       : m_phases(static_cast<int>(medium.phases().size())),
         m_unscattered(field.layout.unscattered),
-        m_power(field.layout.holdsPower()) {
+        m_power(field.layout.holdsPower()),
+        m_weighted(weighsByTheEye(field.layout)) {
     SupportLattice own;
     if (field.layout.carrier == Carrier::particles)
       own = SupportLattice(medium, field.layout.lightVoxel * medium.voxelEdge(), 1);
@@ -101,14 +103,20 @@ class ResolvedField final : public InscatterSource {
     const std::size_t sets = m_unscattered ? 2 : 1;
     const auto phases = static_cast<std::size_t>(m_phases);
     m_fields.resize(sets * phases);
+    std::shared_ptr<const std::vector<float>> weights = field.weights;
+    if (m_weighted && !weights) weights = eyeWeights(medium, lattice, view);
     for (std::size_t k = 0; k < phases; ++k) {
       const PhaseReader reader(field.layout, medium, static_cast<int>(k));
       for (std::size_t set = 0; set < sets; ++set) {
         Colours folded = foldPhase(field, view, set, reader, key);
         m_clamped.count(folded);
-        m_fields[set * phases + k] =
-            layOut(lattice, gather ? spreadParticles(field, lattice, *gather, folded)
-                                   : smoothFluence(medium, lattice, folded, field.layout));
+        if (m_weighted)
+          folded = smoothWeighted(lattice, folded, *weights, field.layout);
+        else if (gather)
+          folded = spreadParticles(field, lattice, *gather, folded);
+        else
+          folded = smoothFluence(medium, lattice, folded, field.layout);
+        m_fields[set * phases + k] = layOut(lattice, folded);
       }
     }
   }
@@ -120,9 +128,9 @@ class ResolvedField final : public InscatterSource {
     Inscatter result;
     for (int k = 0; k < m_phases; ++k) {
       const Rgb sigma = c.scattering[static_cast<std::size_t>(k)] * scale;
-      result.multiple += sigma * Rgb(m_fields[static_cast<std::size_t>(k)].sample(u));
+      result.multiple += sigma * fluence(static_cast<std::size_t>(k), u);
       if (m_unscattered)
-        result.single += sigma * Rgb(m_fields[static_cast<std::size_t>(m_phases + k)].sample(u));
+        result.single += sigma * fluence(static_cast<std::size_t>(m_phases + k), u);
     }
     return result;
   }
@@ -132,6 +140,13 @@ class ResolvedField final : public InscatterSource {
   }
 
  private:
+  // Times the phase function toward the eye [W m^-2 sr^-1].
+  Rgb fluence(std::size_t field, const Vec3f& u) const {
+    const Vec4f v = m_fields[field].sample(u);
+    if (!m_weighted) return Rgb(v);
+    return v.w > 0.0f ? Rgb(v) / v.w : Rgb(0.0f);
+  }
+
   // From particles to the voxels that lookups read.
   Colours spreadParticles(const LightField& field, const SupportLattice& lattice,
                           const ParticleGather& gather, const Colours& folded) const {
@@ -154,6 +169,7 @@ class ResolvedField final : public InscatterSource {
   int m_phases;
   bool m_unscattered;
   bool m_power;
+  bool m_weighted;  // colour over the fourth value is fluence
   Vec3f m_firstNode{0.0f};
   float m_inverseEdge = 1.0f;
   Clamped m_clamped;
@@ -161,6 +177,18 @@ class ResolvedField final : public InscatterSource {
 };
 
 }  // namespace
+
+std::shared_ptr<const std::vector<float>> eyeWeights(const Medium& medium,
+                                                     const SupportLattice& lattice,
+                                                     const View& view) {
+  const VisibleWeight weight(medium, lattice, view);
+  auto weights = std::make_shared<std::vector<float>>(lattice.size());
+  parallelFor(weights->size(), 256, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i)
+      (*weights)[i] = weight.mean(i);
+  });
+  return weights;
+}
 
 std::unique_ptr<InscatterSource> resolve(const Medium& medium, LightField field, const View& view,
                                          RandomKey key) {

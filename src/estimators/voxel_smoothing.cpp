@@ -118,6 +118,14 @@ Colours densityWeighted(const transport::Medium& medium, const SupportLattice& l
 
 }  // namespace
 
+Colours smoothWeighted(const SupportLattice& lattice, const Colours& colours,
+                       const std::vector<float>& weights, const LightFieldLayout& layout) {
+  Colours both(colours.size(), Vec4f(0.0f));
+  for (std::size_t i = 0; i < both.size(); ++i)
+    if (weights[i] > 0.0f) both[i] = Vec4f(Vec3f(colours[i]), weights[i]);
+  return convolve(lattice, both, kernelTaps(layout.kernel, layout.radius / lattice.edge()));
+}
+
 Colours smoothFluence(const transport::Medium& medium, const SupportLattice& lattice,
                       const Colours& colours, const LightFieldLayout& layout) {
   if (layout.smoothing == Smoothing::twicing)

@@ -26,6 +26,11 @@ Smoothed smoothVoxels(const transport::SupportLattice& lattice, const Colours& c
 /// kernel and interpolation falls from second to fourth order in their width. Light stays >= 0.
 Colours sharpened(const Smoothed& smoothed);
 
+/// Weighted fluence and its weights, both smoothed: colour over the fourth value is fluence.
+/// @param weights  VisibleWeight::mean by voxel
+Colours smoothWeighted(const transport::SupportLattice& lattice, const Colours& colours,
+                       const std::vector<float>& weights, const LightFieldLayout& layout);
+
 /// Fluence of a lattice as the layout smooths it.
 Colours smoothFluence(const transport::Medium& medium, const transport::SupportLattice& lattice,
                       const Colours& colours, const LightFieldLayout& layout);

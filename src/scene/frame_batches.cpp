@@ -21,17 +21,17 @@ constexpr const char* kPart = "frame";  // of the checkpoint
 // What batches add up.
 template <class Statistics, class State>
 void eachNumber(Statistics& s, State& state) {
-  state(s.seconds);
-  state(s.photonsEmitted);
-  state(s.photonsScattered);
-  state(s.photonsStored);
-  state(s.photonsCapped);
-  state(s.lightMemoryBytes);
+  state.value(s.seconds);
+  state.value(s.photonsEmitted);
+  state.value(s.photonsScattered);
+  state.value(s.photonsStored);
+  state.value(s.photonsCapped);
+  state.value(s.lightMemoryBytes);
   for (auto* power : {&s.energyEmitted, &s.energyMissed, &s.energyAbsorbed, &s.energyEscaped,
                       &s.energyCapped, &s.energyError})
-    state(*power);
-  state(s.majorantViolations);
-  state(s.clampedLight);
+    state.value(*power);
+  state.value(s.majorantViolations);
+  state.value(s.clampedLight);
 }
 
 // The frame in independent batches, each of photons, samples and random numbers of its own, until

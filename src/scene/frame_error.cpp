@@ -313,8 +313,8 @@ void FrameError::keep(StateWriter& w) const {
     w.value(static_cast<std::uint64_t>(pyramid->levels.size()));
     for (const Moments& level : pyramid->levels) {
       w.value(level.width);
-      w.values(level.mean);
-      w.values(level.squares);
+      w.value(level.mean);
+      w.value(level.squares);
     }
   }
 }
@@ -327,8 +327,8 @@ void FrameError::resume(StateReader& r) {
     pyramid->levels.resize(static_cast<std::size_t>(levels));
     for (Moments& level : pyramid->levels) {
       r.value(level.width);
-      r.values(level.mean);
-      r.values(level.squares);
+      r.value(level.mean);
+      r.value(level.squares);
     }
   }
 }

@@ -3,28 +3,20 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
-#include <numeric>
-#include <tuple>
-#include <utility>
 
 #include "camera_setup.h"
 #include "effect_plan.h"
 #include "estimator_options.h"
+#include "medium_setup.h"
 #include "photon_map_stage.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/frames.h"
 #include "photosphere/core/registry.h"
 #include "photosphere/core/resources.h"
-#include "photosphere/phase/phase.h"
 #include "photosphere/scene/plan.h"
 #include "photosphere/volume/rasterize.h"
-#include "photosphere/volume/vdb_file.h"
-#include "photosphere/volume/velocity.h"
-#include "smoke_source.h"
 #include "unseen_volumes.h"
-#include "volume_emission.h"
 
 namespace photosphere::scene {
 
@@ -33,20 +25,6 @@ namespace {
 // Independent parts of a frame whose error is estimated: the relative standard error of a variance
 // from eight is about a half, but the mean of it over pixels is far better.
 constexpr int kErrorBatches = 8;
-// Voxels that a velocity is carried on beyond those that the cache has.
-constexpr double kMostMargin = 24;
-
-Mat4d localFromWorld(const lights::LocalSpace& space) {
-  Mat4d m(space.metersPerUnit);
-  m[3] = glm::dvec4(-space.center * space.metersPerUnit, 1.0);
-  return m;
-}
-
-Mat4d nodeShift(const Vec3i& origin) {
-  Mat4d m(1.0);
-  m[3] = glm::dvec4(Vec3d(origin), 1.0);
-  return m;
-}
 
 std::uint64_t memoryBudget(const SceneFile& scene) {
   const double limit = scene.render.real("memory_limit");
@@ -54,126 +32,6 @@ std::uint64_t memoryBudget(const SceneFile& scene) {
   const double bytes = limit > 0 ? limit * 1024.0 * 1024.0 * 1024.0
                                  : 0.85 * static_cast<double>(availableMemoryBytes());
   return static_cast<std::uint64_t>(std::max(1.0, std::min(bytes, 9e18)));
-}
-
-bool sameNodes(const volume::BrickField<float>& a, const volume::BrickField<float>& b) {
-  if (a.origin() != b.origin() || a.bricks() != b.bricks() || a.empty() != b.empty()) return false;
-  const Vec3i& bricks = a.bricks();
-  for (int z = 0; z < bricks.z && !a.empty(); ++z)
-    for (int y = 0; y < bricks.y; ++y)
-      for (int x = 0; x < bricks.x; ++x) {
-        const std::int32_t i = a.brickAt({x, y, z}), j = b.brickAt({x, y, z});
-        if ((i < 0) != (j < 0)) return false;
-        if (i >= 0 && !std::equal(a.nodes(i), a.nodes(i) + a.kBrickSize, b.nodes(j))) return false;
-      }
-  return true;
-}
-
-// One field says what three equal ones do: the albedo is grey.
-void dropEqualChannels(std::vector<volume::BrickField<float>>& fields) {
-  if (fields.size() == 3 && sameNodes(fields[0], fields[1]) && sameNodes(fields[0], fields[2]))
-    fields.resize(1);
-}
-
-// Largest of [r, g, b].
-double largestScale(const VolumeEntry& entry) {
-  return maxComponent(entry.values.vec3("density_scale"));
-}
-
-// The densest channel's, and what the others have of it.
-void setExtinction(const VolumeEntry& entry, transport::MediumVolume& placed) {
-  placed.densityScale = largestScale(entry);
-  if (placed.densityScale > 0)
-    placed.tint = Rgb(entry.values.vec3("density_scale") / placed.densityScale);
-}
-
-// Velocity in local space, wide enough for all that moves while the shutter is open.
-transport::VolumeMotion placeMotion(const VolumeSource& source, const lights::LocalSpace& space,
-                                    const transport::Shutter& shutter, std::uint64_t budget,
-                                    std::vector<std::string>& notes) {
-  transport::VolumeMotion motion;
-  if (!source.velocity || !(shutter.longest() > 0)) return motion;
-  const Mat3d linear(localFromWorld(space) * source.worldFromFile);
-  const Mat4d localFromIndex = localFromWorld(space) * source.worldFromIndex(source.velocity);
-  const double raw = volume::statistics(source.velocity).max;
-  const double longest =
-      std::max({glm::length(linear[0]), glm::length(linear[1]), glm::length(linear[2])});
-  const double voxels = raw * longest * shutter.longest() / volume::finestSpacing(localFromIndex);
-  const int margin = static_cast<int>(std::min(std::ceil(voxels) + 1, kMostMargin));
-  if (voxels > kMostMargin)
-    notes.push_back(fmt::format(
-        "{}: the fastest of '{}' moves {:.3g} voxels while the shutter is open on one side of the "
-        "frame; smoke that goes farther than {} voxels beyond the cache's is lost. Velocities are "
-        "scene units a second: convert --velocity-scale brings those of a solver there",
-        source.path, source.velocity.name(), voxels, kMostMargin));
-  const volume::Grid grid =
-      volume::velocityForLookups(source.velocity, linear, margin, source.path);
-  motion.velocity = volume::vectorBricksFromGrid(grid, source.path, budget);
-  motion.localFromNode = localFromIndex * nodeShift(motion.velocity.origin());
-  volume::forEachNode(motion.velocity, [&](const Vec4f& v) {
-    motion.fastest = std::max(motion.fastest, glm::length(Vec3d(v)));
-  });
-  return motion;
-}
-
-// Optical depth of one voxel from where on more of it shows nowhere: the eye sees 1 % of such a
-// voxel's edge deep, and of light that scatters without loss 1 / 10,000 passes. Beyond, distances
-// between collisions would be lost in the rounding of positions, and extinction in the range of a
-// float.
-constexpr double kMostVoxelDepth = 1e4;
-// Density scales that stay within a float's range times any density.
-constexpr double kPlainScale = 1e20;
-
-// Density with its scale where floats hold neither alone, and cut off where it is past measure.
-void placeDensity(const VolumeEntry& entry, const VolumeSource& source, const Mat4d& localFromIndex,
-                  std::uint64_t budget, transport::MediumVolume& placed,
-                  std::vector<std::string>& notes) {
-  setExtinction(entry, placed);
-  volume::ValueScale values;
-  if (placed.densityScale > kPlainScale ||
-      (placed.densityScale > 0 && placed.densityScale < 1 / kPlainScale))
-    values.factor = std::exchange(placed.densityScale, 1.0);
-  const double unit = placed.densityScale * volume::finestSpacing(localFromIndex);
-  if (source.densest * values.factor * unit > kMostVoxelDepth) {
-    values.most = kMostVoxelDepth / unit;
-    notes.push_back(
-        fmt::format("{}: grid '{}' holds densities up to {:.4g}, an optical depth of {:.3g} in one "
-                    "voxel; those "
-                    "beyond {:.0e} are taken as that, which looks the same",
-                    source.path, source.density.name(), source.densest,
-                    source.densest * values.factor * unit, kMostVoxelDepth));
-  }
-  placed.density = volume::bricksFromGrid(source.density, 0, source.path, false, budget, values);
-}
-
-transport::MediumVolume placeVolume(const VolumeEntry& entry, const VolumeSource& source,
-                                    const lights::LocalSpace& space, std::uint64_t budget,
-                                    std::vector<std::string>& notes) {
-  transport::MediumVolume placed;
-  if (!source.density) return placed;
-  placed.name = source.density.name();
-  const Mat4d localFromIndex = localFromWorld(space) * source.worldFromIndex(source.density);
-  placeDensity(entry, source, localFromIndex, budget, placed, notes);
-  placed.localFromNode = localFromIndex * nodeShift(placed.density.origin());
-  placed.albedo = entry.values.rgb("albedo");
-  if (source.albedo) {
-    const int components = source.albedo.kind() == volume::GridKind::vector ? 3 : 1;
-    for (int c = 0; c < components; ++c)
-      placed.albedoFields.push_back(
-          volume::bricksFromGrid(source.albedo, c, source.path, false, budget));
-    dropEqualChannels(placed.albedoFields);
-    placed.localFromAlbedoNode = localFromWorld(space) * source.worldFromIndex(source.albedo) *
-                                 nodeShift(placed.albedoFields.front().origin());
-  }
-  placed.phase = findPlugin(phase::phaseFunctions(), entry.phase, "phase", entry.where)
-                     .create(entry.phaseValues);
-  return placed;
-}
-
-// True when something in the source can be seen at this density scale.
-bool visible(const VolumeSource& source, double densityScale) {
-  const bool smoke = source.density && !source.density.activeBounds().empty() && densityScale > 0;
-  return smoke || (source.emission && !source.emission.activeBounds().empty());
 }
 
 // Keyed values as they are at the frame, and the resolution that is asked for.
@@ -190,83 +48,6 @@ SceneFile sceneOfFrame(const SceneFile& written, std::int64_t frame, const Setup
     throw ConfigError(fmt::format("{}: 'shutter' closes at {}, before it opens at {}",
                                   scene.cameraWhere, shutter.y, shutter.x));
   return scene;
-}
-
-// Particles that lie exactly where others do carry no light of their own: every photon in range of
-// one would be shared out to all of them, which takes as long as there are many. The first stays.
-void dropCoincident(FrameSetup& setup) {
-  std::vector<Vec3f>& particles = setup.particles;
-  std::vector<std::uint32_t> order(particles.size());
-  std::iota(order.begin(), order.end(), 0u);
-  // By bits, which have an order whatever they stand for.
-  const auto keyOf = [&](std::uint32_t i) {
-    const Vec3f& p = particles[i];
-    return std::tuple(std::bit_cast<std::uint32_t>(p.x), std::bit_cast<std::uint32_t>(p.y),
-                      std::bit_cast<std::uint32_t>(p.z), i);
-  };
-  std::sort(order.begin(), order.end(),
-            [&](std::uint32_t a, std::uint32_t b) { return keyOf(a) < keyOf(b); });
-  std::vector<bool> dropped(particles.size());
-  std::size_t count = 0;
-  for (std::size_t i = 1; i < order.size(); ++i)
-    if (particles[order[i]] == particles[order[i - 1]]) {
-      dropped[order[i]] = true;
-      ++count;
-    }
-  if (count == 0) return;
-  std::vector<Vec3f> kept;
-  kept.reserve(particles.size() - count);
-  for (std::size_t i = 0; i < particles.size(); ++i)
-    if (!dropped[i]) kept.push_back(particles[i]);
-  setup.notes.push_back(fmt::format(
-      "{} of {} particles lie exactly where others do; one of each place carries the light", count,
-      particles.size()));
-  particles = std::move(kept);
-}
-
-// Two passes: where the smoke is, then the smoke about its own centre.
-void buildMedium(const SceneFile& scene, std::int64_t cacheFrame, bool wantParticles,
-                 FrameSetup& setup) {
-  std::vector<VolumeSource> sources;
-  const bool glows = scene.effects.text("emission") != "off";
-  const bool moves = scene.effects.text("motion_blur") != "off";
-  for (const VolumeEntry& entry : scene.volumes) {
-    sources.push_back(readVolume(scene, entry, cacheFrame, {wantParticles, glows, moves}));
-    setup.readSeconds += sources.back().readSeconds;
-    setup.rasterizeSeconds += sources.back().rasterizeSeconds;
-    setup.worldBounds.grow(sources.back().bounds());
-    for (const std::string& note : sources.back().notes)
-      setup.notes.push_back(note);
-  }
-  setup.space.metersPerUnit = scene.scene.real("meters_per_unit");
-  if (!setup.worldBounds.empty()) setup.space.center = setup.worldBounds.center();
-
-  const Stopwatch watch;
-  const Vec2d frames = scene.camera.vec2("shutter") / scene.scene.real("fps");
-  const transport::Shutter shutter{frames.x, frames.y};
-  std::vector<transport::MediumVolume> placed;
-  for (std::size_t i = 0; i < sources.size(); ++i) {
-    for (const Vec3d& p : sources[i].particles)
-      setup.particles.emplace_back(setup.space.localFromWorld(p));
-    if (!visible(sources[i], largestScale(scene.volumes[i]))) {
-      setup.notes.push_back(fmt::format("{}: no smoke in it at this frame", sources[i].path));
-      continue;
-    }
-    placed.push_back(
-        placeVolume(scene.volumes[i], sources[i], setup.space, setup.memoryBudget, setup.notes));
-    if (sources[i].emission)
-      placed.back().emission =
-          placeEmission(scene.volumes[i], sources[i], localFromWorld(setup.space),
-                        scene.output.text("colorspace"), setup.memoryBudget, setup.notes);
-    placed.back().motion =
-        placeMotion(sources[i], setup.space, shutter, setup.memoryBudget, setup.notes);
-    if (placed.back().density.empty() && placed.back().emission.field.empty()) placed.pop_back();
-  }
-  dropCoincident(setup);
-  setup.medium = std::make_unique<transport::Medium>(std::move(placed), shutter);
-  // Active voxels may hold zeros: what frames the smoke is the box of what scatters or emits.
-  setup.worldBounds = worldBoundsOf(*setup.medium, setup.space);
-  setup.readSeconds += watch.seconds();
 }
 
 void buildLights(const SceneFile& scene, FrameSetup& setup) {
@@ -293,29 +74,41 @@ double carrierSpacing(const std::vector<Vec3f>& particles) {
   return set.size() > 1 ? volume::medianSpacing(set) : 0.0;
 }
 
-// Mean cosine of the sharpest lobe, and from where on bins have less error than the view basis
-// (README.md, bases of directions): a photon that happens to fly toward the eye counts alone there,
-// and leaves a bright block.
+// |g| of the sharpest lobe from where on a photon that happens to fly toward the eye counts so much
+// alone that it leaves a bright block: its direction is smoothed by a kernel of that width, or kept
+// in that many bins, of which fewer are dark there (README.md, bases of directions).
 constexpr double kSharpLobe = 0.85;
-constexpr int kSharpRows = 4;  // fewer bins than 128 are dark there
+constexpr double kSharpBandwidth = 0.2;  // [rad], epanechnikov
+constexpr int kSharpRows = 4;
 
-// Smoke that has no wider lobes than these has nothing that bins could hold: each is lost in one,
-// whose light is then seen from where none goes.
-constexpr double kNeedle = 0.99;
-
-struct LobeRange {
-  double sharpest = 0, widest = 1;  // |g|
-};
-
-LobeRange lobesOf(const transport::Medium& medium) {
-  LobeRange range;
+double sharpestLobe(const transport::Medium& medium) {
+  double sharpest = 0;
   for (const phase::PhaseFunction& phase : medium.phases())
-    for (int i = 0; i < phase.lobes(); ++i) {
-      const double g = std::abs(phase.lobe(i).g());
-      range.sharpest = std::max(range.sharpest, g);
-      range.widest = std::min(range.widest, g);
-    }
-  return range;
+    for (int i = 0; i < phase.lobes(); ++i)
+      sharpest = std::max(sharpest, std::abs(phase.lobe(i).g()));
+  return sharpest;
+}
+
+// Where the choice is the tool's: what a light cache holds was chosen when it was traced.
+bool smoothsSharpLobes(const ParamValues& e, double sharpest) {
+  return e.text("basis") == "auto" && e.text("type") == "photosphere" && e.text("cache").empty() &&
+         sharpest >= kSharpLobe;
+}
+
+void heedSharpLobes(const ParamValues& e, double sharpest, FrameSetup& setup) {
+  using namespace estimators;
+  LightFieldLayout& l = setup.layout;
+  std::string how;
+  if (l.basis == Basis::view && !e.given("kernel")) {
+    l.angularKernel = sphere::AngularKernel::epanechnikov;
+    l.bandwidth = kSharpBandwidth;
+    how = fmt::format("directions are smoothed over {} rad (estimator.kernel)", l.bandwidth);
+  } else if (l.basis == Basis::histogram && !e.given("rows")) {
+    how = fmt::format("light is stored in {} bins of direction (estimator.rows)", l.bins());
+  }
+  if (!how.empty())
+    setup.notes.push_back(
+        fmt::format("a phase function has a lobe of g = {:.3g}: {}", sharpest, how));
 }
 
 // Angle under which smoke sees the eye move from where it is in the middle of the shutter, up to
@@ -328,7 +121,8 @@ void heedParallax(const SceneFile& scene, FrameSetup& setup) {
   if (scene.estimator.text("type") != "photosphere" || l.basis != estimators::Basis::view ||
       parallax <= kSmallParallax)
     return;
-  const bool chosen = scene.estimator.text("basis") == "auto";
+  const bool chosen =
+      scene.estimator.text("basis") == "auto" && l.smoothing != estimators::Smoothing::visible;
   if (chosen) l.basis = estimators::Basis::histogram;
   setup.notes.push_back(fmt::format(
       "while the shutter is open the smoke sees the camera move by {:.2g} degrees: light is {}",
@@ -341,26 +135,75 @@ void heedParallax(const SceneFile& scene, FrameSetup& setup) {
 // Four are mush already (automaticRadius).
 constexpr int kMostVoxelsWide = 8;
 
+// Light is kept in voxels of two density voxels unless the scene says otherwise, or the smoke is
+// few of them across or several mean free paths deep in each: what light does inside a voxel is
+// lost, up to a fifth of it. Finer ones take more time and memory, so that there is an end to it.
+constexpr double kFewVoxels = 24;  // across the smoke, in the mean of three directions
+constexpr double kThickVoxel = 8, kThickShare = 0.2;  // optical depth; share of the smoke's cells
+constexpr double kFinestVoxel = 0.5;                  // of a density voxel
+constexpr std::uint64_t kMostFineBytes = 256 << 20;
+
+bool isThick(const FrameSetup& setup) {
+  const double edge = setup.layout.lightVoxel * setup.medium->voxelEdge();
+  return setup.medium->majorants().shareAbove(static_cast<float>(kThickVoxel / edge)) > kThickShare;
+}
+
+// Weights by what the camera sees serve voxels of any depth.
+void chooseSmoothing(const ParamValues& e, FrameSetup& setup) {
+  using namespace estimators;
+  LightFieldLayout& l = setup.layout;
+  if (e.text("type") != "photosphere" || e.given("smoothing") || l.basis != Basis::view ||
+      l.carrier != Carrier::voxels || setup.medium->bounds().empty() || !isThick(setup))
+    return;
+  l.smoothing = Smoothing::visible;
+  setup.notes.push_back(
+      "the smoke is many mean free paths deep in each light voxel: photons count by what the "
+      "camera sees of them (estimator.smoothing = \"visible\")");
+}
+
+void chooseLightVoxel(const ParamValues& e, FrameSetup& setup) {
+  using namespace estimators;
+  LightFieldLayout& l = setup.layout;
+  const transport::Medium& medium = *setup.medium;
+  if (e.text("type") != "photosphere" || e.given("light_voxel") || !e.text("cache").empty() ||
+      l.carrier != Carrier::voxels || medium.bounds().empty())
+    return;
+  const Vec3d size = medium.bounds().extent();
+  const double across = std::cbrt(size.x * size.y * size.z) / medium.voxelEdge();
+  const double usual = l.lightVoxel;
+  const double radius = e.real("radius") * setup.space.metersPerUnit;
+  std::string_view why;
+  while (l.lightVoxel > kFinestVoxel) {
+    const bool few = across < kFewVoxels * l.lightVoxel;
+    if (!few && (l.smoothing == Smoothing::visible || !isThick(setup))) break;
+    const double before = std::exchange(l.lightVoxel, 0.5 * l.lightVoxel);
+    const double widest = kMostVoxelsWide * l.lightVoxel * medium.voxelEdge();
+    if (radius > widest || predictedLightBytes(setup) > kMostFineBytes) {
+      l.lightVoxel = before;
+      break;
+    }
+    why = few ? "few voxels across" : "several mean free paths deep in each voxel";
+  }
+  if (l.lightVoxel < usual)
+    setup.notes.push_back(
+        fmt::format("the smoke is {}: light is stored in voxels of {} density voxel "
+                    "(estimator.light_voxel)",
+                    why, l.lightVoxel));
+}
+
 void buildLayout(const SceneFile& scene, const SetupOptions& options, FrameSetup& setup) {
   using namespace estimators;
   const ParamValues& e = scene.estimator;
   LightFieldLayout& l = setup.layout;
   const bool cached = options.forLightCache || !e.text("cache").empty();
   l = layoutOf(e, cached);
-  const LobeRange lobes = lobesOf(*setup.medium);
-  if (const double g = lobes.sharpest; e.text("basis") == "auto" && l.basis == Basis::view &&
-                                       g >= kSharpLobe && lobes.widest < kNeedle) {
-    l.basis = Basis::histogram;
-    if (!e.given("rows")) l.rows = kSharpRows;
-    if (e.text("type") == "photosphere")
-      setup.notes.push_back(
-          fmt::format("a phase function has a lobe of g = {:.3g}: light is stored in {} bins of "
-                      "direction, as estimator.basis = \"view\" would be noisier",
-                      g, l.bins()));
-  }
+  const double sharpest = sharpestLobe(*setup.medium);
+  const bool sharp = smoothsSharpLobes(e, sharpest);
+  if (sharp && !e.given("rows")) l.rows = kSharpRows;  // should it come to bins
   // Light without directions serves every eye.
   const bool even = scattersEvenly(*setup.medium);
   if (!even) heedParallax(scene, setup);
+  if (sharp) heedSharpLobes(e, sharpest, setup);
   // Bins would all be read alike: one coefficient holds what counts.
   const bool ofBins = l.direction != sphere::DirectionDeposit::nearest ||
                       l.representative != Representative::bin || l.merge != Merge::full ||
@@ -373,6 +216,8 @@ void buildLayout(const SceneFile& scene, const SetupOptions& options, FrameSetup
   l.phases = static_cast<int>(setup.medium->phases().size());
   for (const auto& light : setup.lights)
     l.unscattered = l.unscattered || (!light->isDelta() && setup.effects.singleScattering);
+  chooseSmoothing(e, setup);
+  chooseLightVoxel(e, setup);
   l.radius = e.real("radius") * setup.space.metersPerUnit;
   if (!(l.radius > 0)) {
     l.radius = automaticRadius(*setup.medium, l, static_cast<std::uint64_t>(e.integer("photons")));
@@ -388,8 +233,7 @@ void buildLayout(const SceneFile& scene, const SetupOptions& options, FrameSetup
   if (e.text("type") == "photosphere" && !l.holdsPower() && l.radius > widest) {
     setup.notes.push_back(
         fmt::format("estimator.radius = {:.4g} spans {:.3g} light voxels; {} are the most that "
-                    "light is smoothed "
-                    "over, {:.4g} (raise estimator.light_voxel for more)",
+                    "light is smoothed over, {:.4g} (raise estimator.light_voxel for more)",
                     e.real("radius"), l.radius / (l.lightVoxel * setup.medium->voxelEdge()),
                     kMostVoxelsWide, widest / setup.space.metersPerUnit));
     l.radius = widest;

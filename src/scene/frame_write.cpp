@@ -9,8 +9,6 @@
 #include "photosphere/core/registry.h"
 #include "photosphere/core/resources.h"
 #include "photosphere/core/version.h"
-#include "photosphere/image/color.h"
-#include "photosphere/image/preview.h"
 #include "photosphere/scene/plan.h"
 
 namespace photosphere::scene {
@@ -82,15 +80,6 @@ image::ExrAttributes header(const FrameResult& result,
   return image::frameAttributes(metadata);
 }
 
-image::DisplayOptions displayOptions(const std::string& space, const WriteRequest& request) {
-  image::DisplayOptions display;
-  display.renderingSpace = space;
-  display.display = request.ocioDisplay;
-  display.view = request.ocioView;
-  display.exposure = request.exposure;
-  return display;
-}
-
 }  // namespace
 
 image::Image frameImage(const FrameResult& result, const std::vector<std::string>& aovs) {
@@ -123,31 +112,30 @@ image::Image frameImage(const FrameResult& result, const std::vector<std::string
   return out;
 }
 
-void checkWriteRequest(const SceneFile& scene, const WriteRequest& request) {
-  const std::string& space = scene.output.text("colorspace");
-  const image::ColorConfig config = image::ColorConfig::load(request.ocioConfig);
-  config.chromaticities(space);
-  if (request.preview.empty()) return;
-  image::checkPreview(request.preview, config, displayOptions(space, request));
+FrameWriter::FrameWriter(const SceneFile& scene, WriteRequest request)
+    : m_request(std::move(request)),
+      m_layers(scene.output.list("aovs")),
+      m_config(image::ColorConfig::load(m_request.ocioConfig)),
+      m_chromaticities(m_config.chromaticities(scene.output.text("colorspace"))) {
+  m_display.renderingSpace = scene.output.text("colorspace");
+  m_display.display = m_request.ocioDisplay;
+  m_display.view = m_request.ocioView;
+  m_display.exposure = m_request.exposure;
+  if (!m_request.preview.empty()) image::checkPreview(m_request.preview, m_config, m_display);
 }
 
-void writeFrame(FrameResult& result, const SceneFile& scene, const WriteRequest& request) {
+void FrameWriter::write(FrameResult& result) const {
   const Stopwatch watch;
-  const std::string& space = scene.output.text("colorspace");
-  const image::ColorConfig config = image::ColorConfig::load(request.ocioConfig);
-  const auto chromaticities = config.chromaticities(space);
-  if (!request.path.empty()) {
+  if (!m_request.path.empty()) {
     image::ExrOptions options;
-    options.floatColor = request.floatColor;
-    options.compression = request.compression;
-    image::writeExr(framePath(request.path, result.frame),
-                    frameImage(result, scene.output.list("aovs")), header(result, chromaticities),
-                    options);
+    options.floatColor = m_request.floatColor;
+    options.compression = m_request.compression;
+    image::writeExr(framePath(m_request.path, result.frame), frameImage(result, m_layers),
+                    header(result, m_chromaticities), options);
   }
-  if (!request.preview.empty()) {
-    image::writePreview(framePath(request.preview, result.frame), frameImage(result, {"beauty"}),
-                        config, displayOptions(space, request));
-  }
+  if (!m_request.preview.empty())
+    image::writePreview(framePath(m_request.preview, result.frame), frameImage(result, {"beauty"}),
+                        m_config, m_display);
   result.statistics.seconds.write = watch.seconds();
   result.statistics.seconds.total += watch.seconds();
 }

@@ -80,6 +80,11 @@ estimators::LightField readField(const SceneFile& scene, bool allowStale, FrameS
 
 }  // namespace
 
+std::uint64_t storedPhotons(const estimators::LightFieldLayout& layout,
+                            const transport::TraceStatistics& traced) {
+  return layout.unscattered ? traced.flights : traced.scatterings + traced.born;
+}
+
 void addTraced(const transport::TraceStatistics& traced, FrameStatistics& s) {
   s.photonsEmitted += traced.photons;
   s.photonsScattered += traced.scatterings;
@@ -112,10 +117,7 @@ estimators::LightSums lightSums(const RenderRequest& request, FrameSetup& setup,
       estimators::traceLightSums(*setup.medium, setup.lights, setup.layout, setup.view,
                                  setup.particles, options, traced, request.checkpoint, part);
   addTraced(traced, statistics);
-  // Every flight after a scattering or from the smoke's own emission leaves light; the first one of
-  // a lamp does where lamps with extent are kept.
-  statistics.photonsStored +=
-      setup.layout.unscattered ? traced.flights : traced.scatterings + traced.born;
+  statistics.photonsStored += storedPhotons(setup.layout, traced);
   if (light.farPhotons > 0)
     setup.notes.push_back(fmt::format(
         "{} photons met no particle within the deposit radius and went to the nearest one",

@@ -5,6 +5,11 @@
 
 namespace photosphere::scene {
 
+/// Flights that leave light in a field: every one after a scattering or from the smoke's own
+/// emission, and the first one of a lamp where lamps with extent are kept.
+std::uint64_t storedPhotons(const estimators::LightFieldLayout& layout,
+                            const transport::TraceStatistics& traced);
+
 /// Adds the counts and energies of photons traced to a frame's.
 void addTraced(const transport::TraceStatistics& traced, FrameStatistics& statistics);
 

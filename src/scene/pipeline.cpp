@@ -214,9 +214,7 @@ FrameStatistics mergeShards(const std::vector<std::filesystem::path>& shards,
   estimators::MergedLight merged = estimators::mergeLightShards(shards);
   notes = merged.notes;
   addTraced(merged.statistics, statistics);
-  statistics.photonsStored = merged.field.layout.unscattered
-                                 ? merged.statistics.flights
-                                 : merged.statistics.scatterings + merged.statistics.born;
+  statistics.photonsStored = storedPhotons(merged.field.layout, merged.statistics);
   statistics.lightMemoryBytes = merged.field.memoryBytes();
   statistics.mediumHash = merged.key.mediumHash;
   const Stopwatch writing;

@@ -171,9 +171,11 @@ std::span<const Param> estimatorParams() {
        .type = ParamType::text,
        .unit = "",
        .defaultText = "twicing",
-       .help = "of fluence on voxels: sharpened by a second blur, plain, weighted by density, or "
-               "the mean of plain and density",
-       .choices = "twicing|plain|density|mean"},
+       .help = "of fluence on voxels: sharpened by a second blur, plain, weighted by density, the "
+               "mean of plain and density, or weighted by what the camera sees of the smoke where "
+               "a photon passes; where it is not given, the last for smoke that is many mean free "
+               "paths deep in a light voxel, if basis is view",
+       .choices = "twicing|plain|density|mean|visible"},
       {.name = "carrier",
        .type = ParamType::text,
        .unit = "",
@@ -237,7 +239,8 @@ std::span<const Param> estimatorParams() {
        .type = ParamType::text,
        .unit = "",
        .defaultText = "none",
-       .help = "smoothing over directions, of unit integral over the sphere",
+       .help = "smoothing over directions, of unit integral over the sphere; where basis is auto, "
+               "epanechnikov of 0.2 radians for phase functions with a lobe of |g| >= 0.85",
        .choices = "none|epanechnikov|gaussian"},
       {.name = "bandwidth",
        .unit = "radians",
@@ -270,7 +273,8 @@ std::span<const Param> estimatorParams() {
       {.name = "light_voxel",
        .unit = "",
        .defaultText = "2.0",
-       .help = "light voxel edge over density voxel edge",
+       .help = "light voxel edge over density voxel edge; where it is not given, less for smoke "
+               "that is few voxels across or several mean free paths deep in each",
        .min = 0.1,
        .max = 1000},
       {.name = "cache",

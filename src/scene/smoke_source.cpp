@@ -9,6 +9,7 @@
 #include "photosphere/core/frames.h"
 #include "photosphere/core/log.h"
 #include "photosphere/core/resources.h"
+#include "photosphere/volume/grid_variants.h"
 #include "photosphere/volume/invalid_values.h"
 #include "photosphere/volume/rasterize.h"
 #include "photosphere/volume/vdb_file.h"
@@ -91,8 +92,7 @@ void heedSkipped(const SceneFile& scene, const volume::RasterizeResult& result, 
   if (result.skipped == 0) return;
   const std::string what = fmt::format(
       "{} of {} particles have a position, radius or mass that is negative or not finite, the "
-      "first "
-      "is number {}",
+      "first is number {}",
       result.skipped, points, result.firstSkipped);
   if (!scene.allowInvalid)
     throw InputError(
@@ -208,6 +208,8 @@ VolumeSource readVolume(const SceneFile& scene, const VolumeEntry& entry, std::i
   if (source.density) {
     checkAffine(source.path, source.density);
     source.densest = heedInvalid(scene, "density", true, source.density, source);
+    source.density =
+        volume::tilesInLargerVoxels(source.density, entry.values.flag("cell_centered"));
   }
   if (const std::string& name = entry.values.text("velocity");
       wishes.velocity && !name.empty() && !cache.grids.empty()) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "photosphere/scene/scene_file.h"
+#include "photosphere/volume/bricks.h"
 #include "photosphere/volume/grid.h"
 #include "photosphere/volume/particle_set.h"
 
@@ -25,6 +26,9 @@ struct CacheGrids {
 
 /// @throws InputMissingError, InputError
 CacheGrids readCacheGrids(const std::string& path);
+
+/// How the grids of a VolumeSource become bricks: readVolume has looked through their values.
+inline constexpr volume::ValueScale kReadAsChecked{.checked = true};
 
 struct VolumeSource {
   std::string path;

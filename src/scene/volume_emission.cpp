@@ -110,7 +110,7 @@ transport::VolumeEmission placeEmission(const VolumeEntry& entry, const VolumeSo
   transport::VolumeEmission placed;
   const bool thermal = !entry.emission.text("temperature").empty();
   const Scalars values =
-      volume::bricksFromGrid(source.emission, 0, source.path, thermal, budgetBytes);
+      volume::bricksFromGrid(source.emission, 0, source.path, thermal, budgetBytes, kReadAsChecked);
   if (values.empty()) return placed;
   if (thermal) {
     placed.field = glow(values, entry, source.path, colorspace, notes);

@@ -70,6 +70,17 @@ const Row kRows[] = {
      [](LightFieldLayout& l) { l.angularKernel = AngularKernel::gaussian; }},
     {"voxels, epanechnikov 0.5", 0.06, 0.026,
      [](LightFieldLayout& l) { l.angularKernel = AngularKernel::epanechnikov; }},
+    {"view, gaussian 0.5", 0.22, 0.1,
+     [](LightFieldLayout& l) {
+       l.basis = Basis::view;
+       l.angularKernel = AngularKernel::gaussian;
+     }},
+    {"view, epanechnikov 0.3", 0.03, 0.02,
+     [](LightFieldLayout& l) {
+       l.basis = Basis::view;
+       l.angularKernel = AngularKernel::epanechnikov;
+       l.bandwidth = 0.3;
+     }},
     {"voxels, per step", 0.03, 0.02, [](LightFieldLayout& l) { l.evaluate = Evaluate::perStep; }},
     {"particles, gather, per view", 0.64, 2.7,
      [](LightFieldLayout& l) {

@@ -423,7 +423,6 @@ TEST(Layout, RefusesWhatHasNoMeaning) {
       {"direction", [](LightFieldLayout& l) { l.direction = DirectionDeposit::barycentric; }},
       {"representative", [](LightFieldLayout& l) { l.representative = Representative::mean; }},
       {"per_step", [](LightFieldLayout& l) { l.evaluate = Evaluate::perStep; }},
-      {"kernel", [](LightFieldLayout& l) { l.angularKernel = AngularKernel::gaussian; }},
       {"merge", [](LightFieldLayout& l) {
          l.merge = Merge::sampled;
          l.carrier = Carrier::particles;

@@ -70,5 +70,36 @@ TEST(Phases, AgreeWithPathTracing) {
   }
 }
 
+// One photon that flies straight to the eye is as bright as thousands that do not, unless its
+// direction is smoothed; what it gains is what others lose.
+TEST(Phases, SmoothedDirectionsCalmANeedle) {
+  const TestScene scene = plumeScene(0.95, 64, 48);
+  struct Frames {
+    double noise = 0, mean = 0;  // mean squared difference of two seeds over the squared mean; mean
+  };
+  const auto render = [&](sphere::AngularKernel kernel) {
+    LightFieldLayout layout;
+    layout.channels = 1;
+    layout.angularKernel = kernel;
+    layout.bandwidth = 0.3;
+    const std::uint64_t photons = kSanitized ? 5'000 : 200'000;
+    const std::vector<Rgb> a = renderPhotosphere(scene, layout, photons, 5).layers.multiple;
+    const std::vector<Rgb> b = renderPhotosphere(scene, layout, photons, 6).layers.multiple;
+    Frames frames;
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      const double x = static_cast<double>(a[i].x), y = static_cast<double>(b[i].x);
+      frames.noise += (x - y) * (x - y);
+      frames.mean += 0.5 * (x + y);
+    }
+    frames.noise *= static_cast<double>(a.size()) / (frames.mean * frames.mean);
+    std::printf("  noise %.4f, mean %.4f\n", frames.noise, frames.mean);
+    return frames;
+  };
+  const Frames plain = render(sphere::AngularKernel::none);
+  const Frames smoothed = render(sphere::AngularKernel::epanechnikov);
+  EXPECT_LT(smoothed.noise, 0.5 * plain.noise);
+  EXPECT_NEAR(smoothed.mean / plain.mean, 1.0, kSanitized ? 0.5 : 0.1);
+}
+
 }  // namespace
 }  // namespace photosphere::test

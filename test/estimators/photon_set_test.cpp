@@ -116,18 +116,11 @@ void expectNear(const Rgb& fast, const Vec3d& slow, double absolute, const std::
         << what << ", channel " << c;
 }
 
-std::shared_ptr<const sphere::ZonalTable> smoothed(double g, double h) {
-  const phase::HenyeyGreenstein phase(g);
-  const auto moments = sphere::phaseMoments(
-      [&](const Vec3f& w, const Vec3f& wo) { return static_cast<double>(phase.evaluate(w, wo)); });
-  const sphere::SmoothingKernel kernel(sphere::AngularKernel::gaussian, h, 3.0);
-  return std::make_shared<sphere::ZonalTable>(
-      sphere::convolved(moments, sphere::kernelMoments(kernel, moments.size())));
-}
-
 TEST(PhotonSetTest, FixedRadiusIsTheSumOverAllPhotons) {
   const Lobe lobes[] = {{phase::HenyeyGreenstein(0.6), nullptr},
-                        {phase::HenyeyGreenstein(0.6), smoothed(0.6, 0.5)}};
+                        estimators::tabulatedLobe(
+                            phase::HenyeyGreenstein(0.6),
+                            sphere::SmoothingKernel(sphere::AngularKernel::gaussian, 0.5, 3.0))};
   const Vec3f wo = glm::normalize(Vec3f(0.3f, -0.5f, 0.8f));
   for (const Cloud& cloud : clouds())
     for (const int channels : {1, 3})
@@ -236,8 +229,11 @@ TEST(PhotonSetTest, LookupsKeepTheEnergy) {
   const double radius = 0.5;
   const int points = kSanitized ? 20'000 : 200'000;
   for (const SpatialKernel kernel : kKernels)
-    for (const Lobe& lobe : {Lobe{phase::HenyeyGreenstein(0.5), nullptr},
-                             Lobe{phase::HenyeyGreenstein(0.5), smoothed(0.5, 0.4)}}) {
+    for (const Lobe& lobe :
+         {Lobe{phase::HenyeyGreenstein(0.5), nullptr},
+          estimators::tabulatedLobe(
+              phase::HenyeyGreenstein(0.5),
+              sphere::SmoothingKernel(sphere::AngularKernel::gaussian, 0.4, 3.0))}) {
       const std::unique_ptr<PhotonSet> set = makeFixedRadiusSet(photons, kernel, radius);
       Rng rng(RandomKey::fromSeed(14, 0), RandomStream::test, 0);
       Vec3d sum(0.0);

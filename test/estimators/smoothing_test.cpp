@@ -40,6 +40,53 @@ TEST(FluenceSmoothing, DensityGainsWhatPlainLosesAndTheOthersAreBetween) {
     EXPECT_LT(errors[Smoothing::twicing].relMse, errors[way].relMse);
 }
 
+// A voxel's mean says little of light that enters and leaves within a hundredth of it.
+TEST(FluenceSmoothing, WhatTheEyeSeesOfOpaqueVoxelsIsKept) {
+  if (kSanitized) GTEST_SKIP() << "a mean of many paths, too slow under a sanitizer";
+  for (const double depth : {60.0, 3000.0}) {
+    const TestScene scene = sphereScene(depth, 0.95, 0.0, 16, 32);
+    const Truth truth = pathTruth(scene, 100);
+    std::map<Smoothing, double> ratio;
+    for (const Smoothing way : {Smoothing::twicing, Smoothing::visible}) {
+      LightFieldLayout layout;
+      layout.channels = 1;
+      layout.smoothing = way;
+      layout.radius = 0.5 * layout.lightVoxel * scene.medium->voxelEdge();
+      const PhotosphereFrame frame = renderPhotosphere(scene, layout, 200'000, 5);
+      const LayerError e = truth.errorOf(frame.layers, &render::FrameLayers::multiple);
+      std::printf("  %g %-8s mean %.4f  relMSE %.5f\n", depth, std::string(nameOf(way)).c_str(),
+                  e.meanRatio, e.relMse);
+      ratio[way] = e.meanRatio;
+    }
+    EXPECT_LT(ratio[Smoothing::twicing], 0.9) << depth;
+    EXPECT_NEAR(ratio[Smoothing::visible], 1.0, 0.08) << depth;
+  }
+}
+
+// Collisions are weighed as track lengths are.
+TEST(FluenceSmoothing, WhatTheEyeSeesOfCollisionsIsKept) {
+  if (kSanitized) GTEST_SKIP() << "a mean of many paths, too slow under a sanitizer";
+  const TestScene scene = sphereScene(60, 0.95, 0.0, 16, 32);
+  const Truth truth = pathTruth(scene, 100);
+  LightFieldLayout layout;
+  layout.channels = 1;
+  layout.deposit = Deposit::collision;
+  layout.smoothing = Smoothing::visible;
+  layout.radius = 0.5 * layout.lightVoxel * scene.medium->voxelEdge();
+  const PhotosphereFrame frame = renderPhotosphere(scene, layout, 200'000, 5);
+  EXPECT_NEAR(truth.errorOf(frame.layers, &render::FrameLayers::multiple).meanRatio, 1.0, 0.08);
+}
+
+TEST(FluenceSmoothing, WhatTheEyeSeesNeedsAnEye) {
+  LightFieldLayout layout;
+  layout.smoothing = Smoothing::visible;
+  EXPECT_NO_THROW(checkLayout(layout));
+  for (const Basis basis : {Basis::histogram, Basis::sphericalHarmonics}) {
+    layout.basis = basis;
+    EXPECT_THROW(checkLayout(layout), ConfigError);
+  }
+}
+
 TEST(FluenceSmoothing, IsOfVoxelsResolvedPerView) {
   for (const bool particles : {false, true}) {
     LightFieldLayout layout;

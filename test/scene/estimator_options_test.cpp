@@ -77,7 +77,7 @@ INSTANTIATE_TEST_SUITE_P(
                       Illegal{{"basis=view", "direction=barycentric"}, "histogram"},
                       Illegal{{"basis=view", "representative=mean"}, "histogram"},
                       Illegal{{"basis=view", "evaluate=per_step"}, "histogram"},
-                      Illegal{{"basis=view", "kernel=gaussian"}, "histogram"},
+                      Illegal{{"basis=view", "kernel=gaussian", "bandwidth=0"}, "bandwidth"},
                       Illegal{{"direction=kernel"}, "'kernel'"},
                       Illegal{{"kernel=gaussian", "bandwidth=0"}, "bandwidth"},
                       Illegal{{"kernel=gaussian", "truncation=0"}, "truncation"},
@@ -166,6 +166,10 @@ TEST_F(DirectionsOfAScene, AreReadFromACacheAsTheSceneSays) {
     renderScene(scene({"estimator.cache=" + cache, "estimator.merge=sampled"}), 1);
   });
   EXPECT_TRUE(contains(message, "particles")) << message;
+  const std::string blind = complaint([&] {
+    renderScene(scene({"estimator.cache=" + cache, "estimator.smoothing=visible"}), 1);
+  });
+  EXPECT_TRUE(contains(blind, "it needs basis = \"view\"")) << blind;
 }
 
 }  // namespace

@@ -52,21 +52,45 @@ TEST_F(HardValues, CarriersThatCoincideCountOnce) {
   EXPECT_TRUE(notes(setup, "7 of 10 particles lie exactly where others do"));
 }
 
+// What light does inside a light voxel is lost: they are finer where that would be much.
+TEST_F(HardValues, LightVoxelsFitTheSmoke) {
+  const auto blob = [&](const char* name, double radius, float density) {
+    return write(name, {ballGrid("density", Vec3d(0), 1 / radius, density)});
+  };
+  const std::string few = blob("few.vdb", 8, 0.1f), usual = blob("usual.vdb", 40, 0.1f);
+  EXPECT_EQ(setUp(few).layout.lightVoxel, 0.5);
+  EXPECT_TRUE(notes(setUp(few), "few voxels across"));
+  EXPECT_EQ(setUp(blob("some.vdb", 20, 0.1f)).layout.lightVoxel, 1);
+  EXPECT_EQ(setUp(usual).layout.lightVoxel, 2);
+  EXPECT_FALSE(notes(setUp(usual), "estimator.light_voxel"));
+  const std::string opaque = "volume.0.density_scale=3000";
+  const FrameSetup thick =
+      setUp(usual, {opaque, "estimator.basis=spherical_harmonics", "estimator.order=0"});
+  EXPECT_EQ(thick.layout.lightVoxel, 1);
+  EXPECT_TRUE(notes(thick, "several mean free paths deep"));
+  // For one eye it is enough to weigh light by what that sees.
+  const FrameSetup seen = setUp(usual, {opaque});
+  EXPECT_EQ(seen.layout.smoothing, estimators::Smoothing::visible);
+  EXPECT_EQ(seen.layout.lightVoxel, 2);
+  EXPECT_TRUE(notes(seen, "estimator.smoothing"));
+  EXPECT_EQ(setUp(usual).layout.smoothing, estimators::Smoothing::twicing);
+  EXPECT_EQ(setUp(usual, {opaque, "estimator.smoothing=twicing"}).layout.smoothing,
+            estimators::Smoothing::twicing);
+  // What is asked for is done; what would take much memory is not; others keep no such voxels.
+  EXPECT_EQ(setUp(few, {"estimator.light_voxel=2"}).layout.lightVoxel, 2);
+  EXPECT_EQ(setUp(few, {"estimator.basis=histogram", "estimator.rows=64"}).layout.lightVoxel, 2);
+  EXPECT_FALSE(notes(setUp(few, {"estimator.type=photon_map"}), "estimator.light_voxel"));
+}
+
 TEST_F(HardValues, AKernelIsNoWiderThanCanBePaid) {
   const std::string file = write("a.vdb", {ballGrid("density", Vec3d(0), 0.1)});
   const FrameSetup wide = setUp(file, {"estimator.radius=100"});
   EXPECT_NEAR(wide.layout.radius, 8 * 0.2, 1e-6);
   EXPECT_TRUE(notes(wide, "spans 500 light voxels"));
   EXPECT_NEAR(setUp(file, {"estimator.radius=1.5"}).layout.radius, 1.5, 1e-6);
+  EXPECT_EQ(wide.layout.lightVoxel, 2) << "finer voxels would narrow it";
   // A photon map searches what is there.
   EXPECT_FALSE(notes(setUp(file, {"estimator.radius=100", "estimator.type=photon_map"}), "spans"));
-}
-
-TEST_F(HardValues, NeedlesAreNotStoredInBins) {
-  const std::string file = write("a.vdb", {ballGrid("density", Vec3d(0), 0.1)});
-  EXPECT_EQ(setUp(file, {"volume.0.phase={ g = 0.98 }"}).layout.basis,
-            estimators::Basis::histogram);
-  EXPECT_EQ(setUp(file, {"volume.0.phase={ g = -0.99 }"}).layout.basis, estimators::Basis::view);
 }
 
 TEST_F(HardValues, OneHugeParticleIsNamed) {

@@ -184,7 +184,8 @@ class ShotTest : public ::testing::Test {
  protected:
   // A camera that goes 0.2 to the right a frame, 6 before the smoke.
   void write(const std::string& text) { writeText(m_folder / "shot.chan", text); }
-  SceneFile scene(const std::vector<std::string>& sets) {
+  SceneFile scene(std::vector<std::string> sets) {
+    sets.emplace_back("estimator.light_voxel=2");
     return parseScene(ballScene(m_ball, Vec3d(0), 1), "test.toml", m_folder.path(), sets);
   }
   // The same without a place for the camera.
@@ -307,10 +308,22 @@ TEST_F(ShotTest, TheViewIsThatOfTheMiddleOfTheShutter) {
   EXPECT_EQ(wide.layout.basis, estimators::Basis::histogram);
   ASSERT_EQ(wide.notes.size(), 1u);
   EXPECT_TRUE(contains(wide.notes[0], "bins of direction")) << wide.notes[0];
+  // Every note about bins names as many as there are.
+  const FrameSetup sharp =
+      setUpFrame(scene({fast, "camera.shutter=[-6, 6]", "volume.0.phase={ g = 0.9 }"}), 3);
+  EXPECT_EQ(sharp.layout.bins(), 128);
+  ASSERT_EQ(sharp.notes.size(), 2u);
+  for (const std::string& note : sharp.notes)
+    EXPECT_TRUE(contains(note, "128 bins")) << note;
   const FrameSetup asked =
       setUpFrame(scene({fast, "camera.shutter=[-6, 6]", "estimator.basis=view"}), 3);
   EXPECT_EQ(asked.layout.basis, estimators::Basis::view);
   EXPECT_EQ(asked.notes.size(), 1u);
+  // What one eye sees is of one eye, too.
+  const FrameSetup seen =
+      setUpFrame(scene({fast, "camera.shutter=[-6, 6]", "estimator.smoothing=visible"}), 3);
+  EXPECT_EQ(seen.layout.basis, estimators::Basis::view);
+  EXPECT_EQ(seen.layout.smoothing, estimators::Smoothing::visible);
 }
 
 TEST_F(ShotTest, FramesAreThoseOfTheirTime) {

@@ -114,26 +114,44 @@ TEST_F(PipelineTest, TwoOverlappingVolumesAddUp) {
   EXPECT_NEAR(meanOf(twice.layers.multiple) / meanOf(once.layers.multiple), 1.0, 0.02);
 }
 
-// A sharp lobe makes bright blocks of single photons in the view basis.
-TEST_F(PipelineTest, ASharpPhaseFunctionIsStoredInBins) {
+// A sharp lobe makes bright blocks of single photons where directions are not smoothed.
+TEST_F(PipelineTest, DirectionsOfSharpLobesAreSmoothed) {
   const std::string text = ballScene(ball("a.vdb"), Vec3d(0), 1);
-  const auto layout = [&](std::vector<std::string> sets) {
-    return setUpFrame(scene(text, sets), 1).layout;
+  const auto layout = [&](std::vector<std::string> sets, bool cache = false) {
+    SetupOptions options;
+    options.forLightCache = cache;
+    return setUpFrame(scene(text, sets), 1, options).layout;
   };
   using estimators::Basis;
-  EXPECT_EQ(layout({}).basis, Basis::view);
-  EXPECT_EQ(layout({"volume.0.phase={ g = 0.84 }"}).basis, Basis::view);
-  for (const char* phase : {"{ g = 0.85 }", "{ g = -0.9 }", "{ type = \"mie_fog\" }",
-                            "{ type = \"double_henyey_greenstein\", g1 = 0.1, g2 = 0.9 }"}) {
-    const std::string set = std::string("volume.0.phase=") + phase;
-    EXPECT_EQ(layout({set}).basis, Basis::histogram) << phase;
-    EXPECT_EQ(layout({set}).bins(), 128) << phase;
-    EXPECT_EQ(layout({set, "estimator.rows=2"}).bins(), 32) << phase;
-    EXPECT_EQ(layout({set, "estimator.basis=view"}).basis, Basis::view) << phase;
+  using sphere::AngularKernel;
+  for (const char* set : {"scene.seed=1", "volume.0.phase={ g = 0.84 }"}) {
+    EXPECT_EQ(layout({set}).basis, Basis::view);
+    EXPECT_EQ(layout({set}).angularKernel, AngularKernel::none);
+    EXPECT_EQ(layout({set}, true).bins(), 32);
   }
-  const FrameSetup setup = setUpFrame(scene(text, {"volume.0.phase={ g = 0.9 }"}), 1);
+  for (const char* phase :
+       {"{ g = 0.85 }", "{ g = -0.9 }", "{ g = 0.9999 }", "{ type = \"mie_fog\" }",
+        "{ type = \"double_henyey_greenstein\", g1 = 0.1, g2 = 0.9 }"}) {
+    const std::string set = std::string("volume.0.phase=") + phase;
+    EXPECT_EQ(layout({set}).basis, Basis::view) << phase;
+    EXPECT_EQ(layout({set}).angularKernel, AngularKernel::epanechnikov) << phase;
+    EXPECT_EQ(layout({set}).bandwidth, 0.2) << phase;
+    // What is asked for by name is done.
+    EXPECT_EQ(layout({set, "estimator.kernel=none"}).angularKernel, AngularKernel::none) << phase;
+    EXPECT_EQ(layout({set, "estimator.basis=view"}).angularKernel, AngularKernel::none) << phase;
+    // Bins that serve every camera are fine enough.
+    EXPECT_EQ(layout({set}, true).bins(), 128) << phase;
+    EXPECT_EQ(layout({set, "estimator.rows=2"}, true).bins(), 32) << phase;
+  }
+  const FrameSetup setup =
+      setUpFrame(scene(text, {"volume.0.phase={ g = 0.9 }", "estimator.light_voxel=2"}), 1);
   ASSERT_FALSE(setup.notes.empty());
-  EXPECT_TRUE(contains(setup.notes.back(), "estimator.basis")) << setup.notes.back();
+  EXPECT_TRUE(contains(setup.notes.back(), "estimator.kernel")) << setup.notes.back();
+  // What a light cache holds is its own; the notes say nothing else.
+  const FrameSetup cached =
+      setUpFrame(scene(text, {"volume.0.phase={ g = 0.9 }", "estimator.cache=light.vdb"}), 1);
+  for (const std::string& note : cached.notes)
+    EXPECT_FALSE(contains(note, "lobe")) << note;
 }
 
 TEST_F(PipelineTest, AMissingGridListsWhatIsThere) {
@@ -394,7 +412,7 @@ TEST_F(PipelineTest, FilesHoldLayersAndAHeader) {
   WriteRequest request;
   request.path = (m_folder / "out/f.####.exr").string();
   request.preview = (m_folder / "out/f.####.png").string();
-  writeFrame(r, s, request);
+  FrameWriter(s, request).write(r);
   EXPECT_TRUE(std::filesystem::exists(m_folder / "out/f.0007.png"));
   const image::ExrFile file = image::readExr(m_folder / "out/f.0007.exr");
   for (const char* name : {"R", "G", "B", "A", "Z", "single.R", "multiple.G", "transmittance.B"})

@@ -50,7 +50,8 @@ struct Names<Smoothing> {
   static constexpr Named<Smoothing> all[] = {{Smoothing::twicing, "twicing"},
                                              {Smoothing::plain, "plain"},
                                              {Smoothing::density, "density"},
-                                             {Smoothing::mean, "mean"}};
+                                             {Smoothing::mean, "mean"},
+                                             {Smoothing::visible, "visible"}};
 };
 template <>
 struct Names<sphere::DirectionDeposit> {

@@ -8,8 +8,7 @@
 
 #include "photosphere/core/types.h"
 #include "photosphere/estimators/light_field.h"
-#include "photosphere/phase/phase.h"
-#include "photosphere/sphere/zonal.h"
+#include "photosphere/estimators/lobe.h"
 
 namespace photosphere::estimators {
 
@@ -40,19 +39,6 @@ struct PhotonColumns {
   /// Bytes of one photon of that many channels.
   static std::uint64_t bytesOf(int channels) {
     return (6 + static_cast<std::uint64_t>(channels)) * sizeof(float);
-  }
-};
-
-/// A phase function as sums over photons read it.
-struct Lobe {
-  phase::PhaseFunction phase;
-  /// The phase function averaged over the lobe that direction smoothing makes of a photon: the
-  /// convolution of both (eq. 8 on photons). Replaces `phase` where there is one; a phase function
-  /// that is not one Henyey-Greenstein lobe always has it, as a table that is quick to read.
-  std::shared_ptr<const sphere::ZonalTable> smoothed;
-
-  float evaluate(const Vec3f& wi, const Vec3f& wo) const {
-    return smoothed ? (*smoothed)(wi, wo) : phase.evaluate(wi, wo);
   }
 };
 

@@ -9,8 +9,10 @@
 #include "photosphere/core/checkpoint.h"
 #include "photosphere/core/error.h"
 #include "photosphere/estimators/light_shard.h"
+#include "photosphere/image/color.h"
 #include "photosphere/image/exr.h"
 #include "photosphere/image/image.h"
+#include "photosphere/image/preview.h"
 #include "photosphere/render/frame.h"
 #include "photosphere/scene/frame_error.h"
 #include "photosphere/scene/frame_setup.h"
@@ -106,14 +108,24 @@ struct WriteRequest {
 /// @param aovs  names from `layerNames`; empty = all. @throws ConfigError for others
 image::Image frameImage(const FrameResult& result, const std::vector<std::string>& aovs);
 
-/// Whether colour config, colour space, display and kind of preview are such that writeFrame will
-/// not stumble over them: to be known before the work. @throws ConfigError, InputMissingError,
-/// InputError
-void checkWriteRequest(const SceneFile& scene, const WriteRequest& request);
+/// Writes the frames of a scene as EXR and preview.
+class FrameWriter {
+ public:
+  /// Finds out before the work what is wrong with colour config, spaces, display and kind of
+  /// preview.
+  /// @throws ConfigError, InputMissingError, InputError
+  FrameWriter(const SceneFile& scene, WriteRequest request);
+  /// Sets statistics.seconds.write and adds it to the total.
+  /// @throws ConfigError for unknown layers; OutputError
+  void write(FrameResult& result) const;
 
-/// Writes EXR and preview; sets statistics.seconds.write and adds it to the total.
-/// @throws ConfigError for unknown layers or colour spaces; OutputError
-void writeFrame(FrameResult& result, const SceneFile& scene, const WriteRequest& request);
+ private:
+  WriteRequest m_request;
+  std::vector<std::string> m_layers;  // output.aovs
+  image::ColorConfig m_config;
+  std::optional<image::Chromaticities> m_chromaticities;
+  image::DisplayOptions m_display;
+};
 
 /// The object of `--stats` as JSON text with a final newline. Always valid JSON: what is not finite
 /// is null.
