@@ -4,6 +4,7 @@
 #include <malloc.h>
 #include <poll.h>
 #include <signal.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -124,6 +125,12 @@ std::string renderWork(const RenderJob& job) {
       .dump();
 }
 
+void limitCpu(double seconds) {
+  const auto limit = static_cast<rlim_t>(std::max(1.0, seconds));
+  const rlimit both{limit, limit + 1};
+  setrlimit(RLIMIT_CPU, &both);
+}
+
 std::string factsWork(const scene::SceneFile& scene, std::int64_t frame) {
   const scene::FrameSetup setup = scene::setUpFrame(scene, frame);
   const Vec2i size = setup.camera->resolution();
@@ -139,7 +146,7 @@ std::string factsWork(const scene::SceneFile& scene, std::int64_t frame) {
 
 }  // namespace
 
-ChildResult runInChild(const std::function<std::string()>& work) {
+ChildResult runInChild(const std::function<std::string()>& work, double cpuSeconds) {
   throwIfInterrupted();
   std::array<int, 2> ends{};
   if (pipe(ends.data()) != 0)
@@ -157,6 +164,7 @@ ChildResult runInChild(const std::function<std::string()>& work) {
   }
   if (child == 0) {
     close(ends[0]);
+    if (cpuSeconds > 0) limitCpu(cpuSeconds);
     childMain(ends[1], work);
   }
   close(ends[1]);

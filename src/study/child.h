@@ -24,8 +24,9 @@ struct ChildResult {
 /// Runs `work` in a forked child and returns its text. It must be called while this process has no
 /// other threads: the study starts none before its last child has ended. A signal that asks this
 /// process to stop is passed on.
+/// @param cpuSeconds  processor time after which the child is ended, as a failure; 0 = no limit
 /// @throws InterruptedError once the child has ended after a signal; Error when no child can start
-ChildResult runInChild(const std::function<std::string()>& work);
+ChildResult runInChild(const std::function<std::string()>& work, double cpuSeconds = 0);
 
 /// One frame to render in a child.
 struct RenderJob {

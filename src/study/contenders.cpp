@@ -27,6 +27,8 @@ const std::vector<Family>& families() {
       {"view_mean",
        "photosphere, view, mean of plain and density-weighted smoothing",
        {"estimator.basis=view", "estimator.smoothing=mean"}},
+      basisOnly("view_smoothed", "photosphere, view, directions smoothed over 0.2 rad", "view",
+                {"estimator.kernel=epanechnikov", "estimator.bandwidth=0.2"}),
       {"histogram_32", "photosphere, 32 bins", {"estimator.basis=histogram", "estimator.rows=2"}},
       {"histogram_128", "photosphere, 128 bins", {"estimator.basis=histogram", "estimator.rows=4"}},
       {"harmonics",
@@ -67,8 +69,8 @@ const std::vector<Family>& families() {
        {"estimator.type=photon_map", "estimator.passes=8"}},
       {"path_traced", "path tracing", {"estimator.type=path_traced"}, Work::samples},
       {"until_error",
-       "photosphere, view, until its estimated error",
-       {"estimator.basis=view", "estimator.photons=200000", "render.time_limit=10"},
+       "photosphere, until its estimated error",
+       {"estimator.photons=200000", "render.time_limit=10"},
        Work::errorTarget},
       {"single", "single scattering alone", {"estimator.type=single"}, Work::none},
   };
@@ -99,14 +101,15 @@ SweepSize SweepSize::hardCase(bool quick) {
   SweepSize size{{64'000, 1'024'000},
                  {16, 256},
                  {10, 20},
-                 {"view", "histogram_32", "particles_view", "photon_map", "path_traced",
-                  "until_error", "single"}};
+                 {"view", "view_smoothed", "histogram_32", "particles_view", "photon_map",
+                  "path_traced", "until_error", "single"}};
   if (quick) size = {{1'000}, {2}, {2}, {"view", "path_traced", "until_error"}};
   return size;
 }
 
 SweepSize SweepSize::bases(bool quick) {
-  SweepSize size{{1'024'000}, {256}, {}, {"view", "path_traced", "histogram_32_gather"}};
+  SweepSize size{
+      {1'024'000}, {256}, {}, {"view", "view_smoothed", "path_traced", "histogram_32_gather"}};
   for (const char* basis :
        {"histogram_8_means", "histogram_32", "histogram_32_means", "histogram_128", "histogram_512",
         "harmonics_2", "harmonics", "harmonics_8"})

@@ -10,7 +10,7 @@
 #include "photosphere/core/error.h"
 #include "photosphere/core/log.h"
 #include "photosphere/core/resources.h"
-#include "photosphere/image/color.h"
+#include "photosphere/core/shipped_data.h"
 #include "photosphere/image/exr.h"
 #include "photosphere/image/metrics.h"
 
@@ -233,15 +233,7 @@ std::string fileStem(const std::string& text) {
 }
 
 fs::path shippedStudies() {
-  // data/color/config.ocio and data/studies lie side by side wherever the tool's data is.
-  try {
-    const fs::path folder =
-        fs::path(image::shippedColorConfig()).parent_path().parent_path() / "studies";
-    std::error_code error;
-    return fs::is_directory(folder, error) ? folder : fs::path();
-  } catch (const InputMissingError&) {
-    return {};
-  }
+  return findShipped("studies").value_or(fs::path());
 }
 
 }  // namespace photosphere::study

@@ -280,9 +280,12 @@ class Table {
     row.message += (row.message.empty() ? "" : "; ") + why;
   }
 
+  static void judgeMajorants(std::uint64_t violations, StabilityRow& row) {
+    if (violations > 0) fail(row, fmt::format("{} majorants exceeded", violations));
+  }
+
   static void judgeWords(const StabilityCase& c, const StabilityFrame& frame, StabilityRow& row) {
-    if (frame.majorantViolations > 0)
-      fail(row, fmt::format("{} majorants exceeded", frame.majorantViolations));
+    judgeMajorants(frame.majorantViolations, row);
     if (!c.writes.empty() && frame.fileType != c.writes)
       fail(row, fmt::format("the file holds {}, not {}", frame.fileType, c.writes));
     if (frame.notes.find(c.says) == std::string::npos)
@@ -315,8 +318,7 @@ class Table {
   }
 
   void runSlabRadiance(const StabilityCase& c) {
-    const std::vector<SlabRadiance> slabs =
-        slabRadiances(m_catalogue.folder, c.slab.number("g", 0), m_options.quick);
+    const std::vector<SlabRadiance> slabs = slabRadiances(c.slab.number("g", 0), m_options.quick);
     for (const StabilityEstimator* e : estimatorsOf(c))
       for (const SlabRadiance& slab : slabs)
         runSlab(c, *e, slab);
@@ -326,7 +328,7 @@ class Table {
   void runSlab(const StabilityCase& c, const StabilityEstimator& e, const SlabRadiance& slab) {
     StabilityRow row = rowOf(c, e.name);
     row.name = fmt::format("{}_tau{:g}_albedo{:g}", c.name, slab.tau, slab.albedo);
-    row.passed = true;
+    std::uint64_t violations = 0;
     for (const SlabRadiance::Direction& d : slab.directions) {
       Sets sets = c.set;
       append(sets, slab.settings(d));
@@ -335,7 +337,11 @@ class Table {
       row.seconds += frame.seconds;
       row.nanSamples += frame.nanSamples;
       row.negativeSamples += frame.negativeSamples;
-      if (frame.failed) return finish((fail(row, frame.message), row));
+      if (frame.failed) {
+        fail(row, frame.message);
+        return finish(std::move(row));
+      }
+      violations += frame.majorantViolations;
       const double error = std::abs(meanOf(frame) / d.value - 1);
       if (error < row.error && !row.result.empty()) continue;
       row.error = error;
@@ -345,6 +351,7 @@ class Table {
           fmt::format("worst at {} mu {:g}", d.top ? "the lit face," : "the far face,", d.mu);
     }
     row.passed = row.error <= row.bound && row.nanSamples + row.negativeSamples == 0;
+    judgeMajorants(violations, row);
     finish(std::move(row));
   }
 

@@ -2,13 +2,14 @@
 
 #include <fmt/format.h>
 
-#include <toml++/toml.h>
 #include <algorithm>
-#include <cstdlib>
 #include <fstream>
 #include <sstream>
 
+// The parser behaves as that header makes it, in the whole program or nowhere.
+#include "../scene/toml_text.h"
 #include "photosphere/core/error.h"
+#include "photosphere/core/shipped_data.h"
 
 namespace photosphere::study {
 
@@ -178,12 +179,7 @@ std::string readText(const fs::path& path) {
 }
 
 toml::table parse(const fs::path& path) {
-  try {
-    return toml::parse(readText(path), path.string());
-  } catch (const toml::parse_error& error) {
-    throw ConfigError(
-        fmt::format("{}:{}: {}", path.string(), error.source().begin.line, error.description()));
-  }
+  return scene::parseToml(readText(path), path.string(), {}).root;
 }
 
 void readEstimators(const fs::path& path, StabilityCatalogue& catalogue) {
@@ -259,15 +255,7 @@ StabilityCatalogue readStabilityCatalogue(const fs::path& folder) {
 }
 
 fs::path shippedStabilityCatalogue() {
-  std::vector<fs::path> places;
-  if (const char* data = std::getenv("PHOTOSPHERE_DATA"); data && *data)
-    places.push_back(fs::path(data) / "hard");
-  std::error_code error;
-  const fs::path executable = fs::read_symlink("/proc/self/exe", error);
-  if (!error) places.push_back(executable.parent_path().parent_path() / "share/photosphere/hard");
-  places.push_back(fs::path(PHOTOSPHERE_DATA_DIR) / "hard");
-  for (const fs::path& place : places)
-    if (fs::is_regular_file(place / "base.toml", error)) return place;
+  if (const auto found = findShipped("hard/base.toml")) return found->parent_path();
   throw InputMissingError(
       "hard/base.toml",
       "the catalogue of hard cases that is shipped with this tool is not there; "

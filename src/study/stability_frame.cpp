@@ -1,7 +1,6 @@
 #include "stability_frame.h"
 
 #include <fmt/format.h>
-#include <sys/resource.h>
 
 #include <algorithm>
 #include <cmath>
@@ -29,7 +28,7 @@ const std::vector<Rgb>& layerOf(const render::FrameLayers& layers, const std::st
 std::string writtenType(scene::FrameResult& frame, const StabilityFrameJob& job) {
   scene::WriteRequest request;
   request.path = job.exr.string();
-  scene::writeFrame(frame, job.scene, request);
+  scene::FrameWriter(job.scene, request).write(frame);
   const image::ExrFile file = image::readExr(job.exr);
   bool isHalf = true;  // what it could not hold would be infinite
   for (const char* name : {"R", "G", "B"})
@@ -38,12 +37,6 @@ std::string writtenType(scene::FrameResult& frame, const StabilityFrameJob& job)
       isHalf = isHalf && std::abs(v) <= 65504.0f;
     }
   return isHalf ? "half" : "float";
-}
-
-void limitCpu(double seconds) {
-  const auto limit = static_cast<rlim_t>(std::max(1.0, seconds));
-  const rlimit both{limit, limit + 1};
-  setrlimit(RLIMIT_CPU, &both);
 }
 
 // Sums of the frames of all seeds.
@@ -91,7 +84,6 @@ class Mean {
 };
 
 std::string frameWork(const StabilityFrameJob& job) {
-  limitCpu(job.cpuLimit);
   Mean mean(job);
   try {
     for (int i = 0; i < job.seeds; ++i) {
@@ -131,7 +123,7 @@ std::vector<double> blockMeans(const StabilityFrame& frame, int block) {
 }  // namespace
 
 StabilityFrame renderStabilityFrame(const StabilityFrameJob& job) {
-  const ChildResult child = runInChild([&] { return frameWork(job); });
+  const ChildResult child = runInChild([&] { return frameWork(job); }, job.cpuLimit);
   StabilityFrame frame;
   frame.seconds = child.seconds;
   frame.failed = child.failed;

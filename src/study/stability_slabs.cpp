@@ -8,10 +8,9 @@
 #include <sstream>
 
 #include "photosphere/core/error.h"
+#include "photosphere/core/shipped_data.h"
 
 namespace photosphere::study {
-
-namespace fs = std::filesystem;
 
 namespace {
 
@@ -20,12 +19,9 @@ double halfWidth(double tau) {
   return 3 * tau + 18;
 }
 constexpr double kSeen = 3;
-
-std::ifstream openTable(const fs::path& folder) {
-  for (const fs::path& path : {folder / "slab.csv", folder / "../../test/reference/slab.csv"})
-    if (std::ifstream in(path); in) return in;
-  throw InputMissingError((folder / "slab.csv").string(), "is missing, which the slabs need");
-}
+// Light that so few photons of a case reach takes more of them.
+constexpr double kFaint = 1e-3;
+constexpr const char* kFaintPhotons = "estimator.photons=32000000";
 
 }  // namespace
 
@@ -43,16 +39,28 @@ SmokeSpec SlabRadiance::smoke() const {
 std::vector<std::string> SlabRadiance::settings(const Direction& d) const {
   const double s = std::sqrt(std::max(0.0, 1 - d.mu * d.mu)), side = d.top ? 1 : -1;
   const double far = 4 * halfWidth(tau);
-  return {"volume.0.density_scale=1", fmt::format("volume.0.albedo={}", albedo),
-          fmt::format("volume.0.phase={{ type = \"henyey_greenstein\", g = {} }}", g),
-          "light=[{ type = \"directional\", position = [0, 0, 1], target = [0, 0, 0] }]",
-          fmt::format("camera={{ type = \"orthographic\", position = [{}, 0, {}], look_at = [0, 0, "
-                      "0], up = [0, 1, 0], width = {}, resolution = [8, 8] }}",
-                      s * far, side * d.mu * far, 2 * kSeen)};
+  // Across the plane in which the view is tilted, more of the slab is seen at the same distance
+  // from its sides.
+  const bool faint = d.value < kFaint;
+  const int rows = faint ? 8 * std::max(1, static_cast<int>(halfWidth(tau) / (3 * kSeen))) : 8;
+  std::vector<std::string> sets{
+      "volume.0.density_scale=1", fmt::format("volume.0.albedo={}", albedo),
+      fmt::format("volume.0.phase={{ type = \"henyey_greenstein\", g = {} }}", g),
+      "light=[{ type = \"directional\", position = [0, 0, 1], target = [0, 0, 0] }]",
+      fmt::format("camera={{ type = \"orthographic\", position = [{}, 0, {}], look_at = [0, 0, "
+                  "0], up = [0, 1, 0], width = {}, resolution = [8, {}] }}",
+                  s * far, side * d.mu * far, 2 * kSeen, rows)};
+  if (faint) sets.emplace_back(kFaintPhotons);
+  return sets;
 }
 
-std::vector<SlabRadiance> slabRadiances(const fs::path& folder, double g, bool quick) {
-  std::ifstream in = openTable(folder);
+std::vector<SlabRadiance> slabRadiances(double g, bool quick) {
+  constexpr const char* kTable = "reference/slab.csv";
+  std::ifstream in(findShipped(kTable).value_or(kTable));
+  if (!in)
+    throw InputMissingError(kTable,
+                            "the reference values that are shipped with this tool are not there; "
+                            "set PHOTOSPHERE_DATA to the folder that holds reference/");
   std::vector<SlabRadiance> slabs;
   std::string line;
   std::getline(in, line);

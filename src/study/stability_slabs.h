@@ -1,7 +1,7 @@
 #pragma once
-// Radiance that leaves plane-parallel slabs, against the reference values of slab.csv.
+// Radiance that leaves plane-parallel slabs, against the reference values of
+// data/reference/slab.csv.
 
-#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -27,7 +27,7 @@ struct SlabRadiance {
 };
 
 /// Slabs of `g` with tau <= 8 and their directions of mu >= 0.3. @param quick  tau 2, three mu
-/// @throws InputMissingError when slab.csv is neither in the folder nor in the source tree
-std::vector<SlabRadiance> slabRadiances(const std::filesystem::path& folder, double g, bool quick);
+/// @throws InputMissingError when reference/slab.csv is not among the shipped data
+std::vector<SlabRadiance> slabRadiances(double g, bool quick);
 
 }  // namespace photosphere::study

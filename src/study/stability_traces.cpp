@@ -19,6 +19,8 @@ namespace {
 
 using nlohmann::json;
 
+constexpr double kCpuLimit = 1800, kQuickCpuLimit = 60;  // seconds of processor time
+
 // A slab of extinction 1 in z = -tau/2 .. tau/2, so wide that its sides do not matter.
 transport::Medium slab(double tau, double albedo, double g) {
   using Field = volume::BrickField<float>;
@@ -121,7 +123,8 @@ void runFlux(const StabilityCase& c, bool quick, StabilityRow& row) {
   const bool beam = c.slab.number("beam", 0) > 0;
   const double photons = c.slab.number(quick ? "quick_photons" : "photons", 1e5);
   const ChildResult child =
-      runInChild([&] { return fluxWork(c, static_cast<std::uint64_t>(photons)); });
+      runInChild([&] { return fluxWork(c, static_cast<std::uint64_t>(photons)); },
+                 quick ? kQuickCpuLimit : kCpuLimit);
   row.seconds = child.seconds;
   if (child.failed) {
     row.message = child.message;

@@ -11,6 +11,7 @@
 #include "photosphere/image/exr.h"
 #include "photosphere/volume/vdb_file.h"
 #include "support/support.h"
+#include "support/uni_files.h"
 #include "targets.h"
 
 namespace photosphere::fuzz {
@@ -18,7 +19,11 @@ namespace photosphere::fuzz {
 namespace {
 
 using caches::CacheContent;
+using test::deflated;
+using test::gzip;
+using test::put;
 using test::TemporaryFolder;
+using test::uniParticles;
 
 volume::ParticleSet someParticles() {
   volume::ParticleSet set;
@@ -76,11 +81,6 @@ void addWritten(std::vector<Specimen>& all) {
   }
 }
 
-template <class T>
-void put(std::string& out, T value) {
-  out.append(reinterpret_cast<const char*>(&value), sizeof value);
-}
-
 /// A Mantaflow grid of dim^3 cells; type 1 is of numbers, 2 of vectors.
 std::string uniGrid(int dim, int gridType, int elementType) {
   const int components = elementType == 2 ? 3 : 1;
@@ -92,19 +92,6 @@ std::string uniGrid(int dim, int gridType, int elementType) {
   raw.append(8, '\0');
   for (int i = 0; i < dim * dim * dim * components; ++i)
     put(raw, static_cast<float>(i));
-  return raw;
-}
-
-std::string uniParticles(int count) {
-  std::string raw = "PB02";
-  for (const int value : {count, 8, 8, 8, 0, 16})
-    put(raw, value);
-  raw.append(264, '\0');
-  for (int i = 0; i < count; ++i) {
-    for (int c = 0; c < 3; ++c)
-      put(raw, static_cast<float>(i + c) * 0.5f);
-    put(raw, i == 1 ? 1 << 10 : 1);
-  }
   return raw;
 }
 

@@ -3,7 +3,6 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <unistd.h>
-#include <zlib.h>
 
 #include <algorithm>
 #include <stdexcept>
@@ -18,6 +17,7 @@
 #include "photosphere/image/load.h"
 #include "photosphere/scene/scene_file.h"
 #include "photosphere/volume/vdb_file.h"
+#include "support/uni_files.h"
 #include "vdb_walk.h"
 
 namespace photosphere::fuzz {
@@ -25,6 +25,9 @@ namespace photosphere::fuzz {
 namespace fs = std::filesystem;
 
 namespace {
+
+using test::deflated;
+using test::gzip;
 
 /// What must never happen, whatever the bytes are.
 void require(bool holds, const std::string& what) {
@@ -41,21 +44,6 @@ fs::path place(const fs::path& folder, const std::string& name, const std::strin
   close(fd);
   require(written == static_cast<ssize_t>(bytes.size()), "cannot write " + path.string());
   return path;
-}
-
-std::string packed(const std::string& bytes, int level, int windowBits) {
-  z_stream stream{};
-  deflateInit2(&stream, level, Z_DEFLATED, windowBits, 8, Z_DEFAULT_STRATEGY);
-  std::string out(deflateBound(&stream, bytes.size()), '\0');
-  std::string in = bytes;
-  stream.next_in = reinterpret_cast<Bytef*>(in.data());
-  stream.avail_in = static_cast<uInt>(in.size());
-  stream.next_out = reinterpret_cast<Bytef*>(out.data());
-  stream.avail_out = static_cast<uInt>(out.size());
-  deflate(&stream, Z_FINISH);
-  out.resize(stream.total_out);
-  deflateEnd(&stream);
-  return out;
 }
 
 /// Deflate makes at most 1032 bytes of one; text makes a number of every second character.
@@ -257,14 +245,6 @@ void addTexts(std::vector<Target>& all) {
 std::string targetOf(const caches::CacheFormat& format, std::string_view extension) {
   // Leica's tables begin with a count.
   return std::string(extension == ".pts" ? "pts" : format.name);
-}
-
-std::string gzip(const std::string& bytes, int level) {
-  return packed(bytes, level, 15 + 16);
-}
-
-std::string deflated(const std::string& bytes, int level) {
-  return packed(bytes, level, 15);
 }
 
 const std::vector<Target>& targets() {

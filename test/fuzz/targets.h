@@ -41,9 +41,4 @@ std::string targetOf(const caches::CacheFormat& format, std::string_view extensi
 /// At least one for each target: by the writers where there are any, else made here.
 std::vector<Specimen> specimens();
 
-/// The bytes as one gzip stream, stored or packed by its level.
-std::string gzip(const std::string& bytes, int level);
-/// The bytes as one zlib stream.
-std::string deflated(const std::string& bytes, int level);
-
 }  // namespace photosphere::fuzz
