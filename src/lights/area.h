@@ -87,6 +87,7 @@ class SurfaceLight : public Light {
   }
 
   bool isDelta() const override { return false; }
+  std::optional<Place> place() const override { return Place{center(), extent()}; }
   bool isGrey() const override { return isGreyColor(m_radiance); }
 
  protected:

@@ -149,6 +149,7 @@ class SoftSpot final : public Light {
   }
 
   bool isDelta() const override { return false; }
+  std::optional<Place> place() const override { return Place{m_center, m_radius}; }
   bool isGrey() const override { return isGreyColor(m_intensity); }
 
  private:

@@ -47,6 +47,7 @@ class SpotLight final : public Light {
   }
 
   bool isDelta() const override { return true; }
+  std::optional<Place> place() const override { return Place{m_source.position(), 0.0}; }
   bool isGrey() const override { return isGreyColor(m_source.intensity()); }
 
  private:

@@ -4,6 +4,7 @@
 
 #include "instances.h"
 #include "lamp_choice.h"
+#include "near_lamps.h"
 #include "photosphere/render/integrator.h"
 #include "photosphere/transport/scatter.h"
 
@@ -41,7 +42,10 @@ class PathIntegrator final : public Integrator {
     for (double& c : m_cumulative)
       c = sum > 0 ? c / sum : 0;
     if (!(sum > 0)) m_sampled.clear();
-    if (m_sampled.size() > LampChoice::kFew) m_choice.emplace(medium, m_sampled);
+    if (m_sampled.size() > LampChoice::kFew)
+      m_choice.emplace(medium, m_sampled);
+    else if (!medium.bounds().empty())
+      m_near.emplace(medium, m_sampled);
   }
 
   RayRadiance radiance(const Vec3d& origin, const Vec3f& direction, transport::Moment moment,
@@ -51,26 +55,39 @@ class PathIntegrator final : public Integrator {
     RayRadiance result;
     Segment segment = transport::clipToMedium(m_medium, origin, direction,
                                               std::numeric_limits<double>::infinity());
+    if (!(segment.length > 0.0f)) {
+      addEscape(result, Rgb(1.0f), direction, 0);
+      return result;
+    }
     Rgb throughput(1.0f);
-    bool first = true;
+    bool begins = true;   // a flight, rather than its rest past what only some channels met
+    bool forced = false;  // what leaves the smoke unscattered has been counted
     for (int scatterings = 0;;) {
+      if (findsLight(scatterings))
+        addNearLamps(result, throughput, segment, scatterings, rng, counters, when);
       Collision hit;
-      if (first && segment.length > 0.0f) {
+      if (begins) forced = isForced(scatterings, result.transmittance);
+      if (begins && forced) {
+        const auto all =
+            transport::forceCollision<Light>(m_medium, segment.origin, segment.direction,
+                                             lengthOf(segment), rng, counters.tracking, when);
+        if (scatterings == 0) result.transmittance = Rgb(all.transmittance);
+        addEscape(result, throughput * all.transmittance, segment.direction, scatterings);
+        hit = all.hit;
+        throughput *= all.weight;
+      } else if (begins && scatterings == 0) {
         Light transmittance(1.0f);
         hit = transport::sampleCollisionAndTransmittance(m_medium, segment.origin,
                                                          segment.direction, segment.length, rng,
                                                          counters.tracking, transmittance, when);
         result.transmittance = Rgb(transmittance);
-      } else if (segment.length > 0.0f) {
+      } else {
         hit = transport::sampleCollision(m_medium, segment.origin, segment.direction,
                                          segment.length, rng, counters.tracking, when);
       }
-      first = false;
-      if (m_emission && segment.length > 0.0f)
-        addEmission(result, throughput, segment, hit, scatterings, rng, when);
+      if (m_emission) addEmission(result, throughput, segment, hit, scatterings, rng, when);
       if (!hit.happened()) {
-        const Vec3f d = scatterings == 0 ? direction : segment.direction;
-        addEscape(result, throughput, d, scatterings);
+        if (!forced) addEscape(result, throughput, segment.direction, scatterings);
         return result;
       }
       if (scatterings == 0) {
@@ -93,6 +110,7 @@ class PathIntegrator final : public Integrator {
       if (!event.survived) return result;
       if (last && event.scattered) return capped(result, throughput, counters);
       throughput *= event.weight;
+      begins = event.scattered;
       if constexpr (!std::is_same_v<Light, float>)
         if (!event.scattered) {
           segment = {p, segment.direction, kInfinity,
@@ -110,6 +128,28 @@ class PathIntegrator final : public Integrator {
   }
 
  private:
+  // Whether lamps are asked for light that scatters here toward the eye, after so many scatterings.
+  bool findsLight(int scatterings) const {
+    if (m_options.maxScatter > 0 && scatterings >= m_options.maxScatter) return false;
+    return m_options.effects.multipleScattering ||
+           (scatterings == 0 && m_options.effects.singleScattering);
+  }
+
+  // Flights whose collision stands for all that they have: the first and, where that passes thin
+  // smoke, the second, without which little light would ever be found that scatters twice. Not
+  // where the smoke shines: the light of a flight is what lies before a real collision.
+  bool isForced(int scatterings, const Rgb& transmittance) const {
+    constexpr float kThin = 0.5f;
+    if (m_emission) return false;
+    return scatterings == 0 || (scatterings == 1 && maxComponent(transmittance) > kThin);
+  }
+
+  float lengthOf(const Segment& segment) const {
+    return segment.length < kInfinity
+               ? segment.length
+               : transport::exitDistance(m_medium, segment.origin, segment.direction);
+  }
+
   static RayRadiance capped(const RayRadiance& result, const Rgb& throughput,
                             IntegratorCounters& counters) {
     ++counters.capped;
@@ -173,6 +213,16 @@ class PathIntegrator final : public Integrator {
       probability = m_cumulative[i] - (i ? m_cumulative[i - 1] : 0.0);
     }
     const lights::Light& light = *m_sampled[i];
+    float share = 1.0f / static_cast<float>(probability);
+    if (m_near) share *= m_near->shareOfCollisions(i, p);
+    if (share > 0.0f)
+      addLamp(result, throughput * share, light, p, d, scatterings, rng, counters, when);
+  }
+
+  // Light of one lamp that scatters at `p` toward the eye.
+  void addLamp(RayRadiance& result, const Rgb& throughput, const lights::Light& light,
+               const Vec3f& p, const Vec3f& d, int scatterings, Rng& rng,
+               IntegratorCounters& counters, When when) const {
     const Vec2f u = light.isDelta() ? Vec2f(0.5f) : rng.uniform2();
     const lights::Illumination in = light.illuminate(p, u);
     if (!(maxComponent(in.irradiance) > 0.0f)) return;
@@ -182,9 +232,28 @@ class PathIntegrator final : public Integrator {
             ? transport::trackTransmittance<Light>(m_medium, p, -in.direction, in.distance, rng,
                                                    counters.tracking, when)
             : Light(1.0f);
-    add(result,
-        throughput * scattered * in.irradiance * (transmittance / static_cast<float>(probability)),
-        scatterings + 1);
+    add(result, throughput * scattered * in.irradiance * transmittance, scatterings + 1);
+  }
+
+  // Light of lamps near by that scatters along a flight toward the eye, where it is drawn for them.
+  void addNearLamps(RayRadiance& result, const Rgb& throughput, const Segment& flight,
+                    int scatterings, Rng& rng, IntegratorCounters& counters, When when) const {
+    if (!m_near || m_near->lamps().empty()) return;
+    const float length = lengthOf(flight);
+    for (const NearLamps::Lamp& lamp : m_near->lamps()) {
+      const auto drawn =
+          NearLamps::draw(lamp, flight.origin, flight.direction, length, rng.uniform());
+      if (!drawn || !(drawn->weight > 0.0f)) continue;
+      const Vec3f p = flight.origin + flight.direction * drawn->distance;
+      const float extinction = m_medium.extinction(p, when);
+      if (!(extinction > 0.0f)) continue;
+      // Collisions are those of the densest channel.
+      const float reached = transport::trackTransmittance<float>(
+          m_medium, flight.origin, flight.direction, drawn->distance, rng, counters.tracking, when);
+      if (!(reached > 0.0f)) continue;
+      addLamp(result, throughput * (reached * extinction * drawn->weight), *m_sampled[lamp.index],
+              p, flight.direction, scatterings, rng, counters, when);
+    }
   }
 
   // Sum over phase functions of sigma_s over the rate of collisions times the phase.
@@ -207,6 +276,7 @@ class PathIntegrator final : public Integrator {
   std::vector<const lights::Light*> m_escaped;      // what scattered rays meet by leaving
   std::vector<double> m_cumulative;
   std::optional<LampChoice> m_choice;  // of many lamps
+  std::optional<NearLamps> m_near;     // unless there are many
 };
 
 }  // namespace

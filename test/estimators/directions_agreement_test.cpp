@@ -111,7 +111,7 @@ TEST(DirectionOptions, AgreeWithPathTracingOnThePlume) {
   if (kSanitized) GTEST_SKIP() << "a mean of many paths, too slow under a sanitizer";
   TestScene scene = plumeScene(0.7, 64, kPixels);
   scene.particles = seedParticles(*scene.medium, 15000);
-  const Truth truth = pathTruth(scene, 192);
+  const Truth truth = pathTruth(scene, 768);
   for (const Row& row : kRows) {
     LightFieldLayout layout;
     layout.basis = Basis::histogram;

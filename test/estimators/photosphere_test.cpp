@@ -46,7 +46,7 @@ const Judged& judged(const std::string& name) {
   if (name == "plume") j.scene = plumeScene(0.7, 96, kPixels);
   if (name == "column") j.scene = columnScene(kPixels);
   j.scene.particles = seedParticles(*j.scene.medium, 60000);
-  j.truth = pathTruth(j.scene, kSanitized ? 2 : 384);
+  j.truth = pathTruth(j.scene, kSanitized ? 2 : 1024);
   return cache.emplace(name, std::move(j)).first->second;
 }
 

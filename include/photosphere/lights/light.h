@@ -5,6 +5,7 @@
 
 #include <limits>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -58,6 +59,12 @@ struct Reach {
   double oneMinusCos = 2.0;   ///< of the cone's half angle; 2 = in any direction
 };
 
+/// Where a lamp stands.
+struct Place {
+  Vec3d center{0.0};    ///< local space [m]
+  double extent = 0.0;  ///< no point of the lamp lies farther from there [m]
+};
+
 class Light {
  public:
   virtual ~Light() = default;
@@ -86,6 +93,8 @@ class Light {
   /// True for surroundings of one radiance, which rays that leave the scene meet without noise;
   /// other lights are better sampled by `illuminate`.
   virtual bool isUniform() const { return false; }
+  /// From where its light spreads, growing as 1/d^2 on the way there; none for light from far away.
+  virtual std::optional<Place> place() const { return std::nullopt; }
   /// Radiance that a ray which leaves the scene in `direction` meets [W m^-2 sr^-1].
   virtual Rgb background(const Vec3f& direction) const {
     (void)direction;

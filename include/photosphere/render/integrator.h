@@ -66,7 +66,8 @@ struct PathOptions {
   Effects effects;
 };
 
-/// Unbiased path tracing: delta tracking, next-event estimation with ratio-tracked shadows, no
+/// Unbiased path tracing: delta tracking, next-event estimation with ratio-tracked shadows, first
+/// flights that collide for certain, points drawn along flights for lamps that are near; no
 /// bounce cap unless asked.
 std::unique_ptr<Integrator> makePathIntegrator(const transport::Medium& medium,
                                                const transport::LightList& lights,

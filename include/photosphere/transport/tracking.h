@@ -117,16 +117,17 @@ inline constexpr float kThickVoxel = 16.0f;
 /// Calls visit(distance, sigma_t, majorant) for the tentative collisions of a ray, drawn against
 /// the local majorants in order, until it returns false: the walk that delta and ratio tracking
 /// share.
+/// @param density  1, or more to draw that many times as many: majorants are so much larger
 template <class Visit, class When = Still>
 inline void forEachTentative(const Medium& medium, const Vec3f& o, const Vec3f& d, float length,
                              Rng& rng, TrackingCounters& counters, const Visit& visit,
-                             When when = {}) {
+                             When when = {}, float density = 1.0f) {
   const auto extinction = medium.alongRay(o, d, when);
   const float thick = kThickVoxel * medium.steepness();
   float tau = -fastLog(rng.uniformPositive());
   for (volume::MajorantGrid::Walk walk(medium.majorants(), o, d, 0.0f, length); !walk.done();
        walk.advance()) {
-    const float majorant = walk.majorant();
+    const float majorant = walk.majorant() * density;
     const float end = walk.end();
     float t = walk.begin();
     if constexpr (std::is_same_v<When, Still>)
@@ -171,25 +172,24 @@ inline Light extinctionAs(const Medium& medium, const Vec3f& p, float sigma, Whe
     return medium.channels(p, sigma, when);
 }
 
+/// Roulette over light of which less than a tenth is left: its factor, which is 0 where the ray
+/// ends dark and whose mean is 1. Survival is in proportion to what is left.
+inline constexpr float kRouletteFrom = 0.1f;
+inline float roulette(float left, Rng& rng) {
+  if (!(left < kRouletteFrom)) return 1.0f;
+  return left > 1e-30f && rng.uniform() * kRouletteFrom < left ? kRouletteFrom / left : 0.0f;
+}
+
 /// The factor of one tentative collision in a ratio-tracked transmittance, with roulette once that
-/// is small: survival in proportion to what is left keeps it unbiased and ends dark rays.
+/// is small.
 /// @tparam Light  float, or Rgb where the channels differ
 /// @return false when the ray has ended dark
 template <class Light>
 inline bool attenuate(Light& transmittance, const Light& sigma, float majorant, Rng& rng) {
   transmittance *= glm::max(Light(0.0f), Light(1.0f) - sigma / majorant);
-  if (largestOf(transmittance) < 0.1f) {
-    const float left = largestOf(transmittance);
-    if (!(rng.uniform() * 0.1f < left)) {
-      transmittance = Light(0.0f);
-      return false;
-    }
-    if constexpr (std::is_same_v<Light, float>)
-      transmittance = 0.1f;
-    else
-      transmittance *= 0.1f / left;
-  }
-  return true;
+  const float factor = roulette(largestOf(transmittance), rng);
+  transmittance *= factor;
+  return factor > 0.0f;
 }
 
 /// The first real collision (Woodcock delta tracking over local majorants). Where channels differ,
@@ -244,6 +244,62 @@ inline Collision sampleCollisionAndTransmittance(const Medium& medium, const Vec
       },
       when);
   return first;
+}
+
+/// The integral of the majorants along a ray: no optical depth exceeds it.
+inline float majorantDepth(const Medium& medium, const Vec3f& o, const Vec3f& d, float length) {
+  float depth = 0.0f;
+  for (volume::MajorantGrid::Walk walk(medium.majorants(), o, d, 0.0f, length); !walk.done();
+       walk.advance())
+    depth += (walk.end() - walk.begin()) * walk.majorant();
+  return depth;
+}
+
+/// A collision that stands for all that a ray has, rather than for one that may not come.
+/// @tparam Light  float, or Rgb where the channels differ
+template <class Light>
+struct ForcedCollision {
+  Collision hit;
+  float weight = 0.0f;  ///< of the hit; its mean is 1 - transmittance (of the densest channel)
+  Light transmittance{1.0f};  ///< of the whole ray, unbiased
+};
+
+/// Draws one of the tentative collisions of the whole ray, each with the chance that the first real
+/// one is there: weight times f(hit) has the mean of f at the first real collision, 0 where there
+/// is none. Where channels do not differ, weight and transmittance add up to 1. In thin smoke, of
+/// which most rays would meet nothing, more tentative collisions are drawn than the majorants ask
+/// for.
+template <class Light, class When = Still>
+inline ForcedCollision<Light> forceCollision(const Medium& medium, const Vec3f& o, const Vec3f& d,
+                                             float length, Rng& rng, TrackingCounters& counters,
+                                             When when = {}) {
+  constexpr float kTentative = 8.0f;  // on the mean, at least
+  ForcedCollision<Light> forced;
+  const float depth = majorantDepth(medium, o, d, length);
+  if (!(depth > 0.0f)) return forced;
+  float left = 1.0f;  // of the densest channel
+  bool dark = false;
+  forEachTentative(
+      medium, o, d, length, rng, counters,
+      [&](float t, float sigma, float majorant) {
+        // Of what is left a part collides; of little all or nothing, so that the sum stays 1.
+        float first = left * glm::min(1.0f, sigma / majorant);
+        if (left < kRouletteFrom) first = rng.uniform() * majorant < sigma ? left : 0.0f;
+        forced.weight += first;
+        if (rng.uniform() * forced.weight < first) forced.hit = {t, sigma};
+        left -= first;
+        if constexpr (std::is_same_v<Light, float>) {
+          forced.transmittance = left;
+          return left > 0.0f;
+        } else {
+          if (!dark)
+            dark = !attenuate(forced.transmittance, medium.channels(o + d * t, sigma, when),
+                              majorant, rng);
+          return left > 0.0f || !dark;
+        }
+      },
+      when, glm::clamp(kTentative / depth, 1.0f, 1e30f));
+  return forced;
 }
 
 /// Unbiased integral of the medium's emission along a ray [W m^-2 sr^-1], not attenuated: up to a
