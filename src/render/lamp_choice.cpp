@@ -13,6 +13,21 @@ namespace {
 constexpr double kMostEntries = 1 << 22;
 constexpr int kMostCells = 16;
 
+// What a lamp sends to a sphere, up to a factor near 1, and 0 only where none of its light gets
+// [W]. What is asked of so many lamps and cells must cost little: far from a lamp its brightest
+// place in the sphere tells it, moved back to the centre.
+double powerToward(const lights::Light& lamp, const lights::BoundingSphere& around) {
+  if (const std::optional<lights::Place> place = lamp.place()) {
+    const double distance = glm::length(place->center - around.center);
+    const double size = around.radius + place->extent;
+    if (distance > 2 * size) {
+      const double back = (distance - size) / distance;
+      return lamp.reach(around).fluence * back * back * kPi * around.radius * around.radius;
+    }
+  }
+  return std::max(0.0, maxComponent(Vec3d(lamp.power(around))));
+}
+
 }  // namespace
 
 LampChoice::LampChoice(const transport::Medium& medium,
@@ -41,7 +56,7 @@ LampChoice::LampChoice(const transport::Medium& medium,
       const lights::BoundingSphere around{box.min + (place + 0.5) * cell, radius};
       double sum = 0;
       for (std::size_t lamp = 0; lamp < m_lamps; ++lamp) {
-        sum += std::max(0.0, maxComponent(Vec3d(lamps[lamp]->power(around))));
+        sum += powerToward(*lamps[lamp], around);
         sums[lamp] = sum;
       }
       if (!(sum > 0) || !std::isfinite(sum)) continue;
