@@ -25,7 +25,7 @@ double powerToward(const lights::Light& lamp, const lights::BoundingSphere& arou
       return lamp.reach(around).fluence * back * back * kPi * around.radius * around.radius;
     }
   }
-  return std::max(0.0, maxComponent(Vec3d(lamp.power(around))));
+  return lights::largestPower(lamp, around);
 }
 
 }  // namespace

@@ -53,8 +53,7 @@ class SourceChoice {
     const lights::BoundingSphere bounds = boundingSphere(medium);
     double sum = 0;
     for (const auto& light : lights) {
-      const double p = maxComponent(Vec3d(light->power(bounds)));
-      sum += p > 0 ? p : 0;
+      sum += lights::largestPower(*light, bounds);
       m_cumulative.push_back(sum);
     }
     if (const Emission* emission = medium.emission())

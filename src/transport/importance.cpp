@@ -104,7 +104,7 @@ PhotonGuide::PhotonGuide(const Medium& medium, const LightList& lights, Importan
   const lights::BoundingSphere bounds = boundingSphere(medium);
   std::vector<double> powers;
   for (const auto& light : lights)
-    powers.push_back(std::max(0.0, maxComponent(Vec3d(light->power(bounds)))));
+    powers.push_back(lights::largestPower(*light, bounds));
   if (medium.emission()) powers.push_back(medium.emission()->birthPower());
   std::vector<double> means(powers.size());
   double whole = 0, gained = 0;
@@ -118,7 +118,7 @@ PhotonGuide::PhotonGuide(const Medium& medium, const LightList& lights, Importan
             Vec4f u = evenPoint(cell * kTries + static_cast<std::size_t>(i));
             u.x = static_cast<float>(within(cell / kCells, static_cast<double>(u.x)));
             u.y = static_cast<float>(within(cell % kCells, static_cast<double>(u.y)));
-            gains[cell] += gain(medium, lights, bounds, source, u) / kTries;
+            gains[cell] += gain(medium, lights, bounds, source, powers[source], u) / kTries;
           }
       });
     double sum = 0;
@@ -137,7 +137,7 @@ PhotonGuide::PhotonGuide(const Medium& medium, const LightList& lights, Importan
 }
 
 double PhotonGuide::gain(const Medium& medium, const LightList& lights,
-                         const lights::BoundingSphere& bounds, std::size_t source,
+                         const lights::BoundingSphere& bounds, std::size_t source, double usual,
                          const Vec4f& u) const {
   if (source == lights.size()) {
     const Emission::Birth birth =
@@ -150,7 +150,6 @@ double PhotonGuide::gain(const Medium& medium, const LightList& lights,
   const Segment inside =
       clipToMedium(medium, birth.origin, birth.direction, std::numeric_limits<double>::infinity());
   if (!(inside.length > 0.0f)) return 0;
-  const double usual = maxComponent(Vec3d(lights[source]->power(bounds)));
   return power / usual *
          gainAlong(medium, m_importance, inside.origin, inside.direction, inside.length);
 }

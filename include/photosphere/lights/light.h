@@ -3,6 +3,7 @@
 // [m] (ARCHITECTURE.md, Precision): world positions minus the smoke's centre, times metres per
 // unit.
 
+#include <algorithm>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -108,6 +109,11 @@ class Light {
  private:
   std::string m_name;
 };
+
+/// Power that reaches a sphere when nothing is in the way, of the largest channel [W]; at least 0.
+inline double largestPower(const Light& light, const BoundingSphere& bounds) {
+  return std::max(0.0, maxComponent(Vec3d(light.power(bounds))));
+}
 
 struct LightPlugin {
   std::string_view name;

@@ -80,8 +80,9 @@ class PhotonGuide {
     std::vector<float> density;  // over uniform
   };
 
+  // @param usual  the source's power as Light::power tells it [W]
   double gain(const Medium& medium, const LightList& lights, const lights::BoundingSphere& bounds,
-              std::size_t source, const Vec4f& u) const;
+              std::size_t source, double usual, const Vec4f& u) const;
   static Table tableOf(const std::vector<double>& gains, double mean);
 
   ImportanceMap m_importance;
