@@ -48,8 +48,8 @@ double pixelsPerUnit(const SceneFile& scene, const FrameSetup& setup) {
   const Box3d& box = setup.worldBounds;
   if (!camera.hasEye())
     return 1 / glm::length(camera.ray({1, 0}).origin - camera.ray({0, 0}).origin);
-  const Vec3d nearest = glm::clamp(camera.position(), box.min, box.max);
-  const double distance = std::max(glm::length(nearest - camera.position()), 1e-9);
+  const Vec3d eye = camera.position();
+  const double distance = std::max(glm::length(box.nearest(eye) - eye), 1e-9);
   return camera.isPanorama()
              ? width / (2 * kPi * distance)
              : width / (2 * std::tan(horizontalFov(scene.camera) * kPi / 360) * distance);

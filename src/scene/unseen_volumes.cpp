@@ -71,8 +71,7 @@ double distanceBetween(const Box3d& a, const Box3d& b) {
 
 // Solid angle of a sphere from the points of a box, at most [sr].
 double solidAngle(const lights::BoundingSphere& sphere, const Box3d& from) {
-  const double distance =
-      glm::length(sphere.center - glm::clamp(sphere.center, from.min, from.max));
+  const double distance = glm::length(sphere.center - from.nearest(sphere.center));
   if (!(distance > sphere.radius)) return 4 * kPi;
   const double sine = sphere.radius / distance;
   return 2 * kPi * sine * sine / (1 + std::sqrt(1 - sine * sine));

@@ -60,6 +60,8 @@ struct Box {
     grow(b.min);
     grow(b.max);
   }
+  /// The point of the box that is nearest to another.
+  V nearest(const V& p) const { return glm::clamp(p, min, max); }
   bool contains(const V& p) const {
     return p.x >= min.x && p.y >= min.y && p.z >= min.z && p.x <= max.x && p.y <= max.y &&
            p.z <= max.z;
