@@ -22,12 +22,8 @@ constexpr RandomKey kLinesKey{0x9e3779b9u, 0x7f4a7c15u};
 }  // namespace
 
 float VisibleWeight::wayOut(std::size_t voxel, const Vec3f& p, const Vec3f& d) const {
-  const float half = static_cast<float>(0.5 * m_lattice.edge());
-  const Vec3f q = p - m_lattice.center(voxel);
-  float way = 2.0f * half * 1.7320508f;
-  for (int axis = 0; axis < 3; ++axis)
-    if (d[axis] != 0.0f) way = std::min(way, ((d[axis] > 0.0f ? half : -half) - q[axis]) / d[axis]);
-  return std::max(0.0f, way);
+  const Vec3f half(static_cast<float>(0.5 * m_lattice.edge()));
+  return transport::exitDistance(-half, half, p - m_lattice.center(voxel), d);
 }
 
 float VisibleWeight::at(std::size_t voxel, const Vec3f& p) const {

@@ -24,13 +24,16 @@ struct Segment {
 Segment clipToMedium(const Medium& medium, const Vec3d& origin, const Vec3f& direction,
                      double maxDistance);
 
-/// Distance from a point inside the medium's bounds to where a ray leaves them [m].
-inline float exitDistance(const Medium& medium, const Vec3f& p, const Vec3f& d) {
-  const Vec3f low(medium.bounds().min), high(medium.bounds().max);
+/// Distance from a point inside a box to where a ray leaves it.
+inline float exitDistance(const Vec3f& low, const Vec3f& high, const Vec3f& p, const Vec3f& d) {
   float t = kInfinity;
   for (int a = 0; a < 3; ++a)
     if (d[a] != 0.0f) t = glm::min(t, ((d[a] > 0.0f ? high[a] : low[a]) - p[a]) / d[a]);
   return glm::max(t, 0.0f);
+}
+/// Distance from a point inside the medium's bounds to where a ray leaves them [m].
+inline float exitDistance(const Medium& medium, const Vec3f& p, const Vec3f& d) {
+  return exitDistance(Vec3f(medium.bounds().min), Vec3f(medium.bounds().max), p, d);
 }
 
 /// How often the extinction exceeded its majorant. Counted, reported, never clamped away in
