@@ -9,23 +9,20 @@ namespace {
 // Of a lamp's ball over the smoke's. Wider balls cost more points than they save noise.
 constexpr double kRadius = 0.1;
 
-double outsideBox(const Box3d& box, const Vec3d& p) {
-  return glm::length(p - glm::clamp(p, box.min, box.max));
-}
-
 }  // namespace
 
 NearLamps::NearLamps(const transport::Medium& medium,
                      const std::vector<const lights::Light*>& lamps)
-    : m_of(lamps.size(), -1) {
-  const lights::BoundingSphere bounds = transport::boundingSphere(medium);
-  const double radius = kRadius * bounds.radius;
+    : m_lamps(lamps.size()) {
+  if (medium.bounds().empty()) return;
+  const double radius = kRadius * transport::boundingSphere(medium).radius;
   for (std::size_t i = 0; i < lamps.size(); ++i) {
     const std::optional<lights::Place> place = lamps[i]->place();
     if (!place || !(place->extent < 0.5 * radius)) continue;
-    if (!(outsideBox(medium.bounds(), place->center) < radius)) continue;
-    m_of[i] = static_cast<int>(m_lamps.size());
-    m_lamps.push_back({i, Vec3f(place->center), static_cast<float>(radius)});
+    const Vec3d nearest = medium.bounds().nearest(place->center);
+    if (!(glm::length(place->center - nearest) < radius)) continue;
+    m_lamps[i] = {Vec3f(place->center), static_cast<float>(radius)};
+    m_none = false;
   }
 }
 

@@ -16,29 +16,29 @@ namespace photosphere::render {
 /// two sums have the mean of one. Immutable; thread-safe.
 class NearLamps {
  public:
-  /// @param lamps  must outlive it
   NearLamps(const transport::Medium& medium, const std::vector<const lights::Light*>& lamps);
 
   struct Lamp {
-    std::size_t index = 0;  ///< into `lamps`
-    Vec3f center{0.0f};     ///< local space [m]
-    float radius = 0.0f;    ///< of the ball in which points are drawn [m]
+    Vec3f center{0.0f};   ///< local space [m]
+    float radius = 0.0f;  ///< of the ball in which points are drawn [m]; 0 = the lamp is not near
 
     /// Share of the light that is found by drawn points [0, 1]: 1 at the lamp, 0 from the ball's
     /// surface on.
     float share(float squaredDistance) const {
+      if (!(radius > 0.0f)) return 0.0f;
       const float outside = glm::max(0.0f, 1.0f - squaredDistance / (radius * radius));
       return outside * outside;
     }
+    /// Share of its light at `p` that is found where paths collide.
+    float shareOfCollisions(const Vec3f& p) const {
+      const Vec3f toLamp = center - p;
+      return 1.0f - share(glm::dot(toLamp, toLamp));
+    }
   };
+  /// One for each of `lamps`.
   const std::vector<Lamp>& lamps() const { return m_lamps; }
-  /// Share of a lamp's light at `p` that is found where paths collide.
-  float shareOfCollisions(std::size_t lamp, const Vec3f& p) const {
-    const Lamp* near = m_of[lamp] < 0 ? nullptr : &m_lamps[static_cast<std::size_t>(m_of[lamp])];
-    if (!near) return 1.0f;
-    const Vec3f toLamp = near->center - p;
-    return 1.0f - near->share(glm::dot(toLamp, toLamp));
-  }
+  /// True when none of them is near.
+  bool none() const { return m_none; }
 
   struct Drawn {
     float distance = 0.0f;  ///< along the ray [m]
@@ -53,7 +53,7 @@ class NearLamps {
 
  private:
   std::vector<Lamp> m_lamps;
-  std::vector<int> m_of;  // into m_lamps for each lamp; -1 = not near
+  bool m_none = true;
 };
 
 }  // namespace photosphere::render

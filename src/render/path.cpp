@@ -36,7 +36,7 @@ class PathIntegrator final : public Integrator {
     const lights::BoundingSphere bounds = transport::boundingSphere(medium);
     double sum = 0;
     for (const lights::Light* light : m_sampled) {
-      sum += std::max(0.0, maxComponent(Vec3d(light->power(bounds))));
+      sum += lights::largestPower(*light, bounds);
       m_cumulative.push_back(sum);
     }
     for (double& c : m_cumulative)
@@ -44,7 +44,7 @@ class PathIntegrator final : public Integrator {
     if (!(sum > 0)) m_sampled.clear();
     if (m_sampled.size() > LampChoice::kFew)
       m_choice.emplace(medium, m_sampled);
-    else if (!medium.bounds().empty())
+    else
       m_near.emplace(medium, m_sampled);
   }
 
@@ -214,7 +214,7 @@ class PathIntegrator final : public Integrator {
     }
     const lights::Light& light = *m_sampled[i];
     float share = 1.0f / static_cast<float>(probability);
-    if (m_near) share *= m_near->shareOfCollisions(i, p);
+    if (m_near) share *= m_near->lamps()[i].shareOfCollisions(p);
     if (share > 0.0f)
       addLamp(result, throughput * share, light, p, d, scatterings, rng, counters, when);
   }
@@ -238,9 +238,11 @@ class PathIntegrator final : public Integrator {
   // Light of lamps near by that scatters along a flight toward the eye, where it is drawn for them.
   void addNearLamps(RayRadiance& result, const Rgb& throughput, const Segment& flight,
                     int scatterings, Rng& rng, IntegratorCounters& counters, When when) const {
-    if (!m_near || m_near->lamps().empty()) return;
+    if (!m_near || m_near->none()) return;
     const float length = lengthOf(flight);
-    for (const NearLamps::Lamp& lamp : m_near->lamps()) {
+    for (std::size_t i = 0; i < m_sampled.size(); ++i) {
+      const NearLamps::Lamp& lamp = m_near->lamps()[i];
+      if (!(lamp.radius > 0.0f)) continue;
       const auto drawn =
           NearLamps::draw(lamp, flight.origin, flight.direction, length, rng.uniform());
       if (!drawn || !(drawn->weight > 0.0f)) continue;
@@ -251,8 +253,8 @@ class PathIntegrator final : public Integrator {
       const float reached = transport::trackTransmittance<float>(
           m_medium, flight.origin, flight.direction, drawn->distance, rng, counters.tracking, when);
       if (!(reached > 0.0f)) continue;
-      addLamp(result, throughput * (reached * extinction * drawn->weight), *m_sampled[lamp.index],
-              p, flight.direction, scatterings, rng, counters, when);
+      addLamp(result, throughput * (reached * extinction * drawn->weight), *m_sampled[i], p,
+              flight.direction, scatterings, rng, counters, when);
     }
   }
 
