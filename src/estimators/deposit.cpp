@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <bit>
 
-#include "photosphere/core/fixed_point.h"
-
 namespace photosphere::estimators {
 
 using transport::Flight;
@@ -14,39 +12,6 @@ std::vector<bool> wantsUnscattered(const transport::LightList& lights, bool unsc
   for (const auto& light : lights)
     wants.push_back(unscattered && !light->isDelta());
   return wants;
-}
-
-void FixedSums::add(std::size_t at, double value, std::uint32_t bits) {
-  const double units = value / quantum;
-  if (!(units < 4e18)) {
-    overflows.fetch_add(1, std::memory_order_relaxed);
-    return;
-  }
-  const std::int64_t whole = quantize(units, 1.0, bits);
-  if (whole != 0 && !addChecked(sums[at], whole)) overflows.fetch_add(1, std::memory_order_relaxed);
-}
-
-void FixedSums::addSigned(std::size_t at, double value, std::uint32_t bits) {
-  const double units = value / quantum;
-  if (!(std::abs(units) < 4e18)) {
-    overflows.fetch_add(1, std::memory_order_relaxed);
-    return;
-  }
-  const std::int64_t whole = quantizeSigned(units, 1.0, bits);
-  if (whole != 0 && !addChecked(sums[at], whole)) overflows.fetch_add(1, std::memory_order_relaxed);
-}
-
-std::uint32_t roundingBits(RandomKey key, std::uint64_t photon, std::uint32_t flight,
-                           std::uint32_t deposit) {
-  // A hash is enough here: the bits only decide the direction of rounding (murmur3's finaliser).
-  std::uint64_t h = photon * 0x9e3779b97f4a7c15ull ^
-                    (static_cast<std::uint64_t>(flight) << 32 | deposit) ^
-                    (static_cast<std::uint64_t>(key.hi) << 32 | key.lo);
-  h ^= h >> 33;
-  h *= 0xff51afd7ed558ccdull;
-  h ^= h >> 33;
-  h *= 0xc4ceb9fe1a85ec53ull;
-  return static_cast<std::uint32_t>(h >> 32);
 }
 
 CarrierSums::CarrierSums(const transport::Medium& medium, const transport::LightList& lights,

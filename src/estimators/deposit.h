@@ -6,6 +6,7 @@
 
 #include "directional_basis.h"
 #include "particle_index.h"
+#include "photosphere/core/fixed_point.h"
 #include "photosphere/estimators/light_field.h"
 #include "visible_weight.h"
 
@@ -22,22 +23,6 @@ inline int setOf(const transport::Flight& flight, const std::vector<bool>& wants
   if (flight.scatterings > 0 || flight.light == transport::kEmittedBySmoke) return 0;
   return wantsUnscattered[flight.light] ? 1 : -1;
 }
-
-/// Integer sums of one light field and the worth of one unit.
-struct FixedSums {
-  std::vector<std::int64_t> sums;
-  double quantum = 1.0;
-  std::atomic<std::uint64_t> overflows{0};
-
-  /// Adds value (of the quantum's unit), not negative; `bits` rounds it.
-  void add(std::size_t at, double value, std::uint32_t bits);
-  /// The same for a value of either sign.
-  void addSigned(std::size_t at, double value, std::uint32_t bits);
-};
-
-/// 32 bits from a deposit's own coordinates: photon, flight and number within the flight.
-std::uint32_t roundingBits(RandomKey key, std::uint64_t photon, std::uint32_t flight,
-                           std::uint32_t deposit);
 
 /// What every sink does with a flight at a carrier: basis, channels, rounding, sums.
 class CarrierSums {

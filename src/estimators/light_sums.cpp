@@ -9,22 +9,16 @@
 #include "deposit.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/fixed_point.h"
-#include "photosphere/core/log.h"
 #include "photosphere/core/parallel.h"
-#include "photosphere/core/resources.h"
+#include "photosphere/transport/kept_trace.h"
 #include "voxel_lookup.h"
 
 namespace photosphere::estimators {
 
 using transport::Medium;
-using transport::TraceProgress;
 using transport::TraceStatistics;
 
 namespace {
-
-constexpr const char* kPart = "light";
-// Light that took less to trace is traced again rather than kept [s].
-constexpr double kWorthKeeping = 1.0;
 
 [[noreturn]] void failOverflow(std::uint64_t times) {
   throw Error(ExitCode::unspecified,
@@ -83,21 +77,12 @@ class Tracing {
 
  private:
   TraceStatistics trace(const Medium& medium, const transport::LightList& lights,
-                        transport::TraceOptions& options, transport::FlightSink& sink) {
-    const WriteState write = [this](StateWriter& w) { keep(w); };
-    if (m_checkpoint) {
-      resume();
-      options.begun = m_done;
-      options.pause = [&](const TraceProgress& done) {
-        m_done = done;
-        m_checkpoint->offer(kPart, write);
-      };
-    }
-    const Stopwatch watch;
-    const TraceStatistics statistics = transport::tracePhotons(medium, lights, options, sink);
+                        const transport::TraceOptions& options, transport::FlightSink& sink) {
+    const transport::TraceKeeping keeping{m_checkpoint, m_part, [this](StateWriter& w) { keep(w); },
+                                          [this](StateReader& r) { resume(r); }};
+    const TraceStatistics statistics =
+        transport::tracePhotons(medium, lights, options, sink, keeping);
     if (m_sums.overflows > 0) failOverflow(m_sums.overflows);
-    // What comes next keeps the picture, not the light that it is made from.
-    if (m_checkpoint && watch.seconds() > kWorthKeeping) m_checkpoint->save(kPart, write);
     m_light.farPhotons = farPhotons();
     m_light.sums = std::move(m_sums.sums);
     return statistics;
@@ -108,23 +93,16 @@ class Tracing {
   }
 
   void keep(StateWriter& w) const {
-    w.value(m_part);
-    w.value(m_done);
     w.value(farPhotons());
     w.value(m_sums.overflows.load());
     w.value(m_sums.sums);
   }
-
-  void resume() {
-    std::optional<StateReader> kept = m_checkpoint->load(kPart);
-    if (!kept || kept->value<std::uint64_t>() != m_part) return;
-    kept->value(m_done);
-    kept->value(m_farBefore);
-    m_sums.overflows = kept->value<std::uint64_t>();
+  void resume(StateReader& r) {
+    r.value(m_farBefore);
+    m_sums.overflows = r.value<std::uint64_t>();
     const std::size_t size = m_sums.sums.size();
-    kept->value(m_sums.sums);
-    if (m_sums.sums.size() != size) kept->fail();
-    log::info("light goes on from {} photons", m_done.photons);
+    r.value(m_sums.sums);
+    if (m_sums.sums.size() != size) r.fail();
   }
 
   LightSums& m_light;
@@ -132,7 +110,6 @@ class Tracing {
   std::uint64_t m_part;
   std::uint64_t m_farBefore = 0;              // of earlier runs
   const ParticleSink* m_particles = nullptr;  // while photons are traced onto particles
-  TraceProgress m_done;
   FixedSums m_sums;
 };
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "instances.h"
+#include "photosphere/transport/scatter.h"
 
 namespace photosphere::render {
 
@@ -22,14 +23,6 @@ float nearLampFactor(const MarchStep& step, const Vec3f& p, const lights::Illumi
   const float h = std::max(std::sqrt(glm::dot(across, across)), 1e-6f * in.distance + 1e-20f);
   const float angle = std::atan((step.t1 - along) / h) - std::atan((step.t0 - along) / h);
   return angle / (h * (step.t1 - step.t0)) * in.distance * in.distance;
-}
-
-Rgb phased(const Medium& medium, const Coefficients& c, const Vec3f& wi, const Vec3f& wo) {
-  const auto& phases = medium.phases();
-  Rgb sum(0.0f);
-  for (std::size_t i = 0; i < phases.size(); ++i)
-    sum += c.scattering[i] * phases[i].evaluate(wi, wo);
-  return sum;
 }
 
 }  // namespace
@@ -67,7 +60,7 @@ Rgb DirectLight::of(std::size_t i, const Vec3f& p, const Vec3f& wo, const Coeffi
                             ? m_shadows.transmittance<Light>(i, p, in.direction, in.distance, rng,
                                                              counters.tracking, when)
                             : Light(1.0f);
-  return phased(m_medium, c, in.direction, wo) * in.irradiance * visible;
+  return transport::scatteringToward(m_medium, c, in.direction, wo) * in.irradiance * visible;
 }
 
 template <class Light, class When>

@@ -12,7 +12,6 @@ namespace photosphere::render {
 
 namespace {
 
-using transport::Coefficients;
 using transport::Collision;
 using transport::Medium;
 using transport::Segment;
@@ -226,7 +225,7 @@ class PathIntegrator final : public Integrator {
     const Vec2f u = light.isDelta() ? Vec2f(0.5f) : rng.uniform2();
     const lights::Illumination in = light.illuminate(p, u);
     if (!(maxComponent(in.irradiance) > 0.0f)) return;
-    const Rgb scattered = phaseAlbedo(p, in.direction, -d, when);
+    const Rgb scattered = transport::phaseAlbedo(m_medium, p, in.direction, -d, when);
     const Light transmittance =
         m_options.effects.shadows
             ? transport::trackTransmittance<Light>(m_medium, p, -in.direction, in.distance, rng,
@@ -256,18 +255,6 @@ class PathIntegrator final : public Integrator {
       addLamp(result, throughput * (reached * extinction * drawn->weight), *m_sampled[i], p,
               flight.direction, scatterings, rng, counters, when);
     }
-  }
-
-  // Sum over phase functions of sigma_s over the rate of collisions times the phase.
-  Rgb phaseAlbedo(const Vec3f& p, const Vec3f& wi, const Vec3f& wo, When when) const {
-    const auto& phases = m_medium.phases();
-    if (const Rgb* uniform = m_medium.uniformAlbedo()) return *uniform * phases[0].evaluate(wi, wo);
-    Coefficients c;
-    m_medium.coefficients(p, c, when);
-    Rgb sum(0.0f);
-    for (std::size_t i = 0; i < phases.size(); ++i)
-      sum += c.scattering[i] * phases[i].evaluate(wi, wo);
-    return c.extinction > 0.0f ? sum / c.extinction : Rgb(0.0f);
   }
 
   const Medium& m_medium;

@@ -3,7 +3,11 @@
 // same deposits give the same bits for any number of threads, shards or restarts.
 
 #include <atomic>
+#include <cmath>
 #include <cstdint>
+#include <vector>
+
+#include "photosphere/core/rng.h"
 
 namespace photosphere {
 
@@ -31,5 +35,56 @@ inline bool addChecked(std::int64_t& sum, std::int64_t value) {
   std::int64_t unused;
   return !__builtin_add_overflow(before, value, &unused);
 }
+
+/// A number of a deposit's own coordinates: photon, flight and number within the flight (murmur3's
+/// finaliser).
+inline std::uint64_t depositHash(RandomKey key, std::uint64_t photon, std::uint32_t flight,
+                                 std::uint32_t deposit) {
+  std::uint64_t h = photon * 0x9e3779b97f4a7c15ull ^
+                    (static_cast<std::uint64_t>(flight) << 32 | deposit) ^
+                    (static_cast<std::uint64_t>(key.hi) << 32 | key.lo);
+  h ^= h >> 33;
+  h *= 0xff51afd7ed558ccdull;
+  h ^= h >> 33;
+  h *= 0xc4ceb9fe1a85ec53ull;
+  return h;
+}
+
+/// 32 bits of the same: a hash is enough where they only decide the direction of rounding.
+inline std::uint32_t roundingBits(RandomKey key, std::uint64_t photon, std::uint32_t flight,
+                                  std::uint32_t deposit) {
+  return static_cast<std::uint32_t>(depositHash(key, photon, flight, deposit) >> 32);
+}
+
+/// Integer sums and the worth of one unit. Many threads may add at once.
+struct FixedSums {
+  std::vector<std::int64_t> sums;
+  double quantum = 1.0;
+  std::atomic<std::uint64_t> overflows{0};
+
+  /// Adds value (of the quantum's unit), not negative; `bits` rounds it.
+  void add(std::size_t at, double value, std::uint32_t bits) {
+    const double units = value / quantum;
+    if (units < kMost)
+      addWhole(at, quantize(units, 1.0, bits));
+    else
+      overflows.fetch_add(1, std::memory_order_relaxed);
+  }
+  /// The same for a value of either sign.
+  void addSigned(std::size_t at, double value, std::uint32_t bits) {
+    const double units = value / quantum;
+    if (std::abs(units) < kMost)
+      addWhole(at, quantizeSigned(units, 1.0, bits));
+    else
+      overflows.fetch_add(1, std::memory_order_relaxed);
+  }
+
+ private:
+  static constexpr double kMost = 4e18;
+  void addWhole(std::size_t at, std::int64_t whole) {
+    if (whole != 0 && !addChecked(sums[at], whole))
+      overflows.fetch_add(1, std::memory_order_relaxed);
+  }
+};
 
 }  // namespace photosphere

@@ -6,6 +6,29 @@
 
 namespace photosphere::transport {
 
+/// Sum over phase functions of sigma_s times the phase [1/(m sr)].
+/// @param wi, wo  unit, both along the light's way
+inline Rgb scatteringToward(const Medium& medium, const Coefficients& c, const Vec3f& wi,
+                            const Vec3f& wo) {
+  const auto& phases = medium.phases();
+  Rgb sum(0.0f);
+  for (std::size_t i = 0; i < phases.size(); ++i)
+    sum += c.scattering[i] * phases[i].evaluate(wi, wo);
+  return sum;
+}
+
+/// Part of the light of a collision that goes toward `wo`: the same over the rate of collisions
+/// [1/sr].
+template <class When = Still>
+inline Rgb phaseAlbedo(const Medium& medium, const Vec3f& p, const Vec3f& wi, const Vec3f& wo,
+                       When when = {}) {
+  if (const Rgb* uniform = medium.uniformAlbedo())
+    return *uniform * medium.phases()[0].evaluate(wi, wo);
+  Coefficients c;
+  medium.coefficients(p, c, when);
+  return c.extinction > 0.0f ? scatteringToward(medium, c, wi, wo) / c.extinction : Rgb(0.0f);
+}
+
 /// Result of a collision.
 struct ScatterEvent {
   bool survived = false;
