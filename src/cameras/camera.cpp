@@ -114,6 +114,22 @@ Mat4d worldFromCameraValues(const ParamValues& common) {
   return Mat4d(glm::dvec4(x, 0), glm::dvec4(glm::cross(z, x), 0), glm::dvec4(z, 0), m[3]);
 }
 
+std::optional<Projection> Camera::project(const Vec3d& world) const {
+  const std::optional<Mat4d> ndc = ndcFromWorld();
+  if (!ndc) return std::nullopt;
+  const glm::dvec4 seen = *ndc * glm::dvec4(world, 1.0);
+  if (!(seen.w > 0)) return std::nullopt;
+  const Mat4d rows = glm::transpose(*ndc);
+  Projection p;
+  for (int i = 0; i < 2; ++i) {
+    const double position = seen[i] / seen.w, size = resolution()[i];
+    p.raster[i] = position * size;
+    p.gradient[static_cast<std::size_t>(i)] =
+        size / seen.w * (Vec3d(rows[i]) - position * Vec3d(rows[3]));
+  }
+  return p;
+}
+
 PlacedCamera::PlacedCamera(const Mat4d& worldFromCamera, const Vec2i& resolution, double halfWidth)
     : m_worldFromCamera(worldFromCamera), m_resolution(resolution) {
   if (resolution.x < 1 || resolution.y < 1)

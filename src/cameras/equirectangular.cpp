@@ -23,6 +23,22 @@ class Equirectangular final : public PlacedCamera {
     return {position() + direction * m_near, glm::normalize(direction)};
   }
 
+  std::optional<Projection> project(const Vec3d& world) const override {
+    const Vec3d v = world - position();
+    const double side = glm::dot(v, right()), ahead = -glm::dot(v, back()),
+                 rise = glm::dot(v, up());
+    const double level2 = side * side + ahead * ahead, level = std::sqrt(level2);
+    if (!(level2 > 0)) return std::nullopt;  // at the poles, which are no one's place
+    const Vec2d perRadian(resolution().x / (2 * kPi), resolution().y / kPi);
+    Projection p;
+    p.raster = Vec2d(0.5 * resolution().x, 0.5 * resolution().y) +
+               perRadian * Vec2d(std::atan2(side, ahead), -std::atan2(rise, level));
+    const Vec3d outward = (side * right() - ahead * back()) / level;
+    p.gradient[0] = perRadian.x / level2 * (ahead * right() + side * back());
+    p.gradient[1] = -perRadian.y / (level2 + rise * rise) * (level * up() - rise * outward);
+    return p;
+  }
+
   bool hasEye() const override { return true; }
   bool isPanorama() const override { return true; }
 

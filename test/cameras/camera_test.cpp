@@ -74,6 +74,50 @@ TEST(Projection, InvertsTheRaysOfRandomCameras) {
   }
 }
 
+// Of all cameras, panoramas too; gradients against differences along the picture.
+TEST(Projection, OfPointsInvertsRaysAndKnowsItsGradient) {
+  Rng rng(RandomKey::fromSeed(2, 0), RandomStream::test, 0);
+  const auto between = [&](double a, double b) { return a + (b - a) * rng.uniformDouble(); };
+  const Vec2i resolution(320, 160);
+  for (const char* model : {"perspective", "orthographic", "equirectangular"})
+    for (int trial = 0; trial < 100; ++trial) {
+      const Vec3d eye(between(-9, 9), between(-9, 9), between(-9, 9));
+      const Mat4d place = lookAt(eye, {between(-9, 9), between(-9, 9), between(-9, 9)},
+                                 Vec3d(sampleSphere(rng.uniform2())));
+      const auto camera = makeCamera(model, {{"near", "0.3"}}, place, resolution);
+      const Vec2d raster(between(0.02, 0.98) * resolution.x, between(0.02, 0.98) * resolution.y);
+      const double distance = between(0.5, 30);
+      const auto at = [&](const Vec2d& r, double t) {
+        const CameraRay ray = camera->ray(r);
+        return ray.origin + ray.direction * t;
+      };
+      const Vec3d p = at(raster, distance);
+      const auto seen = camera->project(p);
+      ASSERT_TRUE(seen) << model;
+      EXPECT_NEAR(seen->raster.x, raster.x, 1e-7) << model;
+      EXPECT_NEAR(seen->raster.y, raster.y, 1e-7) << model;
+      // One pixel across moves x by one and y by nothing; a step along the ray moves neither.
+      constexpr double h = 1e-3;
+      for (int axis = 0; axis < 2; ++axis) {
+        Vec2d step(0.0);
+        step[axis] = h;
+        const Vec3d way = (at(raster + step, distance) - at(raster - step, distance)) / (2 * h);
+        for (int i = 0; i < 2; ++i)
+          EXPECT_NEAR(glm::dot(seen->gradient[static_cast<std::size_t>(i)], way),
+                      i == axis ? 1.0 : 0.0, 1e-4)
+              << model;
+      }
+      const Vec3d along = camera->ray(raster).direction;
+      for (const Vec3d& gradient : seen->gradient)
+        EXPECT_NEAR(glm::dot(gradient, along), 0.0, 1e-8 * glm::length(gradient)) << model;
+    }
+  const auto ahead = makeCamera("perspective", {}, lookAt({0, 0, 5}, {0, 0, 0}, {0, 1, 0}));
+  EXPECT_FALSE(ahead->project({0, 0, 6}));
+  // A unit of area at distance 5 on the axis: pixels of the frame over the area that it shows.
+  const double shown = 2 * 5 * std::tan(15 * kPi / 180) / 1280;
+  EXPECT_NEAR(ahead->project({0, 0, 0})->pixelsPerArea(), 1 / (shown * shown), 1e-6);
+}
+
 TEST(Projection, HasSquarePixelsTheStatedViewAndYDown) {
   const Mat4d place = lookAt({0, 0, 5}, {0, 0, 0}, {0, 1, 0});
   const auto camera = makeCamera("perspective", {{"fov", "90"}}, place, {200, 100});

@@ -1,6 +1,7 @@
 #pragma once
 // Cameras: the table of models and the rays they make.
 
+#include <array>
 #include <memory>
 #include <optional>
 #include <span>
@@ -15,6 +16,16 @@ namespace photosphere::cameras {
 struct CameraRay {
   Vec3d origin{0.0};
   Vec3d direction{0.0, 0.0, -1.0};
+};
+
+/// Where a point is seen.
+struct Projection {
+  Vec2d raster{0.0};  ///< as Camera::ray takes it [pixels]
+  /// Of raster.x and raster.y over the point [pixels / scene unit].
+  std::array<Vec3d, 2> gradient{};
+  /// Of the picture on which an area at the point falls that faces the ray
+  /// [pixels^2 / scene unit^2].
+  double pixelsPerArea() const { return glm::length(glm::cross(gradient[0], gradient[1])); }
 };
 
 /// A camera of one frame. World: right-handed; the camera looks along its -Z.
@@ -40,6 +51,9 @@ class Camera {
   /// RenderMan's worldToNDC: (0,0) upper left, (1,1) lower right after the homogeneous division.
   /// Nothing for a panorama, which no matrix projects.
   virtual std::optional<Mat4d> ndcFromWorld() const { return std::nullopt; }
+  /// The raster position, within the frame or not, whose ray passes a point of world space: the
+  /// inverse of `ray`, but for where rays begin. Nothing where there is none.
+  virtual std::optional<Projection> project(const Vec3d& world) const;
   virtual Vec2i resolution() const = 0;
 };
 
