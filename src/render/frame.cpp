@@ -368,6 +368,13 @@ float PixelFilter::profile(double x) const {
   return 0.0f;
 }
 
+void setMultiple(FrameLayers& layers, std::vector<Rgb> multiple) {
+  layers.multiple = std::move(multiple);
+  for (std::size_t i = 0; i < layers.beauty.size(); ++i)
+    layers.beauty[i] =
+        layers.single[i] + layers.multiple[i] + layers.emission[i] + layers.background[i];
+}
+
 FrameLayers renderFrame(const cameras::Camera& camera, const Integrator& integrator,
                         const FrameOptions& options) {
   FrameLayers out;

@@ -24,7 +24,8 @@ bool readAlongRays(const SceneFile& scene, const FrameSetup& setup) {
 
 void aimLight(const SceneFile& scene, const render::Crop& crop, FrameSetup& setup) {
   const transport::Medium& medium = *setup.medium;
-  const bool traces = storesLight(scene, setup) && scene.estimator.text("cache").empty();
+  const bool traces =
+      setup.lightPaths || (storesLight(scene, setup) && scene.estimator.text("cache").empty());
   // A lens and a shutter look around the frame's edges.
   const bool fixed = setup.lens.radius == 0 && !medium.isMoving() && !setup.motion;
   if (!traces || !fixed || medium.bounds().empty()) return;

@@ -16,6 +16,10 @@ namespace {
 // Share of the squared target that noise and doubt may have in an estimate that stands.
 constexpr double kSettled = 0.1;
 
+// Paths from the lamps take longer: they are the truth where their squared noise is this part of
+// that of paths from the eye.
+constexpr double kFarQuieter = 0.3;
+
 constexpr const char* kPart = "frame";  // of the checkpoint
 
 // What batches add up.
@@ -73,7 +77,7 @@ class FrameLoop {
   }
 
  private:
-  // Stored light is biased, so its frames are held against path traced ones: turn by turn at
+  // Stored light is biased, so its frames are held against unbiased ones: turn by turn at
   // first, then whichever leaves the greater doubt is rendered.
   bool wantsBatch() const {
     if (!m_checked) return true;
@@ -105,9 +109,16 @@ class FrameLoop {
     if (m_batches > 0 || m_pass > 0) m_setup.notes.resize(m_notesBefore);
     const Stopwatch watch;
     if (!m_renderer) m_renderer.emplace(m_scene, m_crop, m_setup);
+    std::vector<Rgb> multiple;
+    double traced = m_result.statistics.seconds.trace;
+    if (m_setup.lightPaths)
+      multiple = m_renderer->lightPaths(m_request.checkpoint, static_cast<std::uint64_t>(m_batches),
+                                        m_result.statistics);
+    traced = m_result.statistics.seconds.trace - traced;
     StateReader* begun = m_film ? &*m_film : nullptr;
     render::FrameLayers layers = m_renderer->render(light.source.get(), m_pass, begun, filmPause());
     m_film.reset();
+    if (!multiple.empty()) render::setMultiple(layers, std::move(multiple));
     std::optional<render::FrameLayers> throughWider;
     if (light.wider) throughWider = m_renderer->render(light.wider.get(), m_pass);
     // From here on nothing interrupts: what is kept has all of a pass or nothing.
@@ -117,17 +128,66 @@ class FrameLoop {
     else if (judged)
       m_error.add(layers.beauty);
     if (once()) m_result.layers = std::move(layers);
-    m_result.statistics.seconds.march += watch.seconds();
+    m_result.statistics.seconds.march += watch.seconds() - traced;
     m_partKept = false;
   }
 
   void renderTruth() {
     const Stopwatch watch;
     if (!m_renderer) m_renderer.emplace(m_scene, m_crop, m_setup);
-    // Another seed than the batches': its bits turned over.
-    m_error.addTruth(m_renderer->truth(RandomKey::fromSeed(~seed(), m_error.truths())));
+    if (!m_fromLamps) {
+      beginTruths();
+    } else {
+      m_error.addTruth(truth(m_error.truths(), *m_fromLamps));
+    }
     m_result.statistics.seconds.check += watch.seconds();
     offer();
+  }
+
+  // Two truths by paths from the eye, or two from the lamps where those are far quieter. Not by
+  // what they take: the choice is a matter of bits, not of the clock.
+  void beginTruths() {
+    const std::vector<Rgb> eye[] = {truth(0, false), truth(1, false)};
+    m_fromLamps = false;
+    if (!m_setup.medium->isMoving() && !m_setup.motion) {
+      const std::vector<Rgb> lamps[] = {truth(0, true), truth(1, true)};
+      m_fromLamps = blockNoise(lamps[0], lamps[1]) < kFarQuieter * blockNoise(eye[0], eye[1]);
+      if (*m_fromLamps)
+        for (const std::vector<Rgb>& frame : lamps)
+          m_error.addTruth(frame);
+    }
+    if (!*m_fromLamps)
+      for (const std::vector<Rgb>& frame : eye)
+        m_error.addTruth(frame);
+  }
+
+  // Of another seed than the batches': its bits turned over.
+  std::vector<Rgb> truth(int index, bool fromLamps) const {
+    return m_renderer->truth(RandomKey::fromSeed(~seed(), index), fromLamps);
+  }
+
+  // How far two frames differ in the means of blocks, beside these and the frame's own mean.
+  double blockNoise(const std::vector<Rgb>& a, const std::vector<Rgb>& b) const {
+    constexpr int kEdge = 8;
+    const int width = m_crop.max.x - m_crop.min.x, columns = (width + kEdge - 1) / kEdge;
+    std::vector<Vec2d> blocks(a.size() / static_cast<std::size_t>(width) / kEdge *
+                                  static_cast<std::size_t>(columns) +
+                              static_cast<std::size_t>(columns));
+    Vec2d all(0.0);
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      const std::size_t x = i % static_cast<std::size_t>(width),
+                        y = i / static_cast<std::size_t>(width);
+      const Vec2d both(static_cast<double>(meanComponent(a[i])),
+                       static_cast<double>(meanComponent(b[i])));
+      blocks[y / kEdge * static_cast<std::size_t>(columns) + x / kEdge] += both;
+      all += both / static_cast<double>(blocks.size());
+    }
+    double sum = 0;
+    for (const Vec2d& block : blocks) {
+      const double scale = block.x + block.y + all.x + all.y;
+      if (scale > 0) sum += (block.x - block.y) * (block.x - block.y) / (scale * scale);
+    }
+    return sum;
   }
 
   // Between parts. A frame of one part is done when that is, and needs keeping no more.
@@ -160,6 +220,7 @@ class FrameLoop {
     w.value(m_secondsBefore + m_watch.seconds());
     eachNumber(m_statisticsBefore, w);
     w.value(m_estimate);
+    w.value(m_fromLamps);
     w.text(m_result.layout);
     w.value(m_result.radius);
     w.value(static_cast<std::uint64_t>(m_notesBefore));
@@ -178,6 +239,7 @@ class FrameLoop {
     kept->value(m_secondsBefore);
     eachNumber(m_result.statistics, *kept);
     kept->value(m_estimate);
+    kept->value(m_fromLamps);
     m_result.layout = kept->text();
     kept->value(m_result.radius);
     m_setup.notes.clear();
@@ -261,7 +323,8 @@ class FrameLoop {
   std::size_t m_notesBefore = 0;       // the same
   std::optional<StateReader> m_film;   // what an earlier run had of the pass under way
   bool m_partKept = false;             // the checkpoint has some of the pass under way
-  bool m_checked;                      ///< against path traced frames
+  bool m_checked;                      // against unbiased frames
+  std::optional<bool> m_fromLamps;     // where their paths begin, once there are some
   RandomKey m_key;
   std::optional<LayerRenderer> m_renderer;
   render::FrameMean m_mean;

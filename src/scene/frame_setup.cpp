@@ -242,6 +242,16 @@ void buildLayout(const SceneFile& scene, const SetupOptions& options, FrameSetup
   l.depositRadius = deposit > 0 ? deposit : l.radius;
 }
 
+// As many as a path tracer would send from the eye.
+std::int64_t lightPaths(const SceneFile& scene, const FrameSetup& setup) {
+  if (setup.medium->isMoving() || setup.motion)
+    throw ConfigError(
+        "estimator.type = \"light_traced\" joins photons to a camera at rest in smoke at rest; set "
+        "effects.motion_blur = \"off\", or use \"path_traced\"");
+  const Vec2i size = setup.camera->resolution();
+  return scene.estimator.integer("samples") * size.x * size.y;
+}
+
 }  // namespace
 
 FrameSetup setUpFrame(const SceneFile& written, std::int64_t frame, const SetupOptions& options) {
@@ -262,7 +272,10 @@ FrameSetup setUpFrame(const SceneFile& written, std::int64_t frame, const SetupO
                                   scene.scene.flag("seed_per_frame") ? frame : 0);
   if (scene.render.real("target_error") > 0 || scene.render.real("time_limit") > 0)
     setup.batches = kErrorBatches;
-  const auto photons = static_cast<std::uint64_t>(scene.estimator.integer("photons"));
+  setup.lightPaths =
+      scene.estimator.text("type") == "light_traced" && setup.effects.multipleScattering;
+  const auto photons = static_cast<std::uint64_t>(
+      setup.lightPaths ? lightPaths(scene, setup) : scene.estimator.integer("photons"));
   const auto batches = static_cast<std::uint64_t>(setup.batches);
   setup.photons = (photons + batches - 1) / batches;
   planPhotonMap(scene, setup);
@@ -303,9 +316,11 @@ FrameMemory predictedMemory(const FrameSetup& setup, bool storedLight) {
   memory.smoke = setup.medium->memoryBytes();
   memory.light = storedLight ? predictedLightBytes(setup) : 0;
   const Vec2i size = setup.camera->resolution();
+  const std::uint64_t frames =
+      setup.batches > 1 || (setup.photonMap && setup.photonMap->passes > 1) ? 3 : 1;
   memory.pixels = static_cast<std::uint64_t>(size.x) * static_cast<std::uint64_t>(size.y) *
-                  (6 * sizeof(Rgb) + 2 * sizeof(float)) *
-                  (setup.batches > 1 || (setup.photonMap && setup.photonMap->passes > 1) ? 3 : 1);
+                  (frames * (6 * sizeof(Rgb) + 2 * sizeof(float)) +
+                   (setup.lightPaths ? sizeof(Rgb) + 3 * sizeof(std::int64_t) : 0));
   return memory;
 }
 

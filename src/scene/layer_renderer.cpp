@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "light_stage.h"
+#include "photosphere/core/resources.h"
+
 namespace photosphere::scene {
 
 namespace {
@@ -22,12 +25,10 @@ render::FilterKind filterKind(const std::string& name) {
 // What a path tracer or a light cache holds although the scene switched it off.
 void dropLayers(const Effects& effects, render::FrameLayers& layers) {
   if (effects.singleScattering && effects.multipleScattering) return;
-  for (std::size_t i = 0; i < layers.beauty.size(); ++i) {
-    if (!effects.singleScattering) layers.single[i] = Rgb(0.0f);
-    if (!effects.multipleScattering) layers.multiple[i] = Rgb(0.0f);
-    layers.beauty[i] =
-        layers.single[i] + layers.multiple[i] + layers.emission[i] + layers.background[i];
-  }
+  if (!effects.singleScattering) layers.single.assign(layers.single.size(), Rgb(0.0f));
+  render::setMultiple(layers, effects.multipleScattering
+                                  ? std::move(layers.multiple)
+                                  : std::vector<Rgb>(layers.multiple.size(), Rgb(0.0f)));
 }
 
 std::uint64_t shadowBudget(const FrameSetup& setup) {
@@ -59,13 +60,19 @@ constexpr std::int64_t kTruthPaths = 150'000;
 
 }  // namespace
 
+bool sendsPaths(const SceneFile& scene) {
+  const std::string& type = scene.estimator.text("type");
+  return type == "path_traced" || type == "light_traced";
+}
+
 LayerRenderer::LayerRenderer(const SceneFile& scene, const render::Crop& crop,
                              const FrameSetup& setup)
     : m_setup(setup),
-      m_paths(scene.estimator.text("type") == "path_traced"),
+      m_paths(sendsPaths(scene)),
       m_options(frameOptions(scene, crop, setup, m_paths)) {
   if (m_paths) m_path.maxScatter = static_cast<int>(scene.estimator.integer("max_scatter"));
   m_path.effects = m_march.effects = setup.effects;
+  if (setup.lightPaths) m_path.effects.multipleScattering = false;
   m_march.step = static_cast<float>(scene.render.real("step"));
   if (m_paths) return;
   if (storesLight(scene, setup))
@@ -88,6 +95,32 @@ render::FrameLayers LayerRenderer::render(const estimators::InscatterSource* sou
   return render(source, pass, std::move(options));
 }
 
+std::vector<Rgb> LayerRenderer::lightPaths(render::LightPathOptions options,
+                                           transport::TraceStatistics& traced) const {
+  options.filter = m_options.filter;
+  options.filterWidth = m_options.filterWidth;
+  options.crop = m_options.crop;
+  options.space = m_options.space;
+  options.lens = m_options.lens;
+  return render::traceLightPaths(*m_setup.camera, *m_setup.medium, m_setup.lights, options, traced);
+}
+
+std::vector<Rgb> LayerRenderer::lightPaths(Checkpoint* checkpoint, std::uint64_t part,
+                                           FrameStatistics& statistics) const {
+  const Stopwatch watch;
+  render::LightPathOptions options;
+  options.photons = m_setup.photons;
+  options.key = m_setup.key;
+  options.guide = m_setup.guide.get();
+  options.checkpoint = checkpoint;
+  options.part = part;
+  transport::TraceStatistics traced;
+  std::vector<Rgb> multiple = lightPaths(options, traced);
+  addTraced(traced, statistics);
+  statistics.seconds.trace += watch.seconds();
+  return multiple;
+}
+
 render::FrameLayers LayerRenderer::renderCrop(const estimators::InscatterSource* source, int pass,
                                               const render::Crop& crop) const {
   render::FrameOptions options = m_options;
@@ -108,14 +141,25 @@ render::FrameLayers LayerRenderer::render(const estimators::InscatterSource* sou
   return layers;
 }
 
-std::vector<Rgb> LayerRenderer::truth(RandomKey key) const {
+std::vector<Rgb> LayerRenderer::truth(RandomKey key, bool fromLamps) const {
   render::FrameOptions options = m_options;
   const Vec2i size = options.crop.max - options.crop.min;
   const std::int64_t pixels = std::max<std::int64_t>(1, std::int64_t{size.x} * size.y);
   options.samples = static_cast<int>(std::clamp<std::int64_t>(kTruthPaths / pixels, 1, 64));
   options.key = key;
-  const auto integrator = render::makePathIntegrator(*m_setup.medium, m_setup.lights, m_path);
+  render::PathOptions path = m_path;
+  path.effects.multipleScattering = !fromLamps;
+  const auto integrator = render::makePathIntegrator(*m_setup.medium, m_setup.lights, path);
   render::FrameLayers layers = render::renderFrame(*m_setup.camera, *integrator, options);
+  if (fromLamps) {
+    render::LightPathOptions paths;
+    const Vec2i frame = m_setup.camera->resolution();
+    paths.photons = static_cast<std::uint64_t>(options.samples) *
+                    static_cast<std::uint64_t>(frame.x) * static_cast<std::uint64_t>(frame.y);
+    paths.key = key;
+    transport::TraceStatistics traced;
+    render::setMultiple(layers, lightPaths(paths, traced));
+  }
   dropLayers(m_setup.effects, layers);
   return std::move(layers.beauty);
 }

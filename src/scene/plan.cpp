@@ -30,11 +30,17 @@ struct Light {
   double trace = 0, resolve = 0;  // [s]
 };
 
-Light traceLight(const SceneFile& scene, const RenderRequest& request, FrameSetup& setup) {
+Light traceLight(const SceneFile& scene, const RenderRequest& request,
+                 const LayerRenderer& renderer, FrameSetup& setup) {
   Light light;
   light.photons = setup.photons;
   FrameStatistics statistics;
   const Stopwatch tracing;
+  if (setup.lightPaths) {
+    renderer.lightPaths(nullptr, 0, statistics);
+    light.trace = tracing.seconds();
+    return light;
+  }
   if (setup.photonMap) {
     light.source = photonMapPass(setup, 0, 1.0, statistics);
     light.trace = tracing.seconds();
@@ -69,7 +75,7 @@ class RayCost {
     const Stopwatch watch;
     m_some.emplace(fewer, render::Crop{{0, 0}, setup.camera->resolution()}, setup);
     m_before = watch.seconds();
-    const bool paths = scene.estimator.text("type") == "path_traced";
+    const bool paths = sendsPaths(scene);
     const auto samples = [&](const SceneFile& s) {
       const std::int64_t n = (paths ? s.estimator : s.render).integer("samples");
       return static_cast<double>((n + setup.batches - 1) / setup.batches);
@@ -78,6 +84,8 @@ class RayCost {
   }
   double before() const { return m_before; }
   std::uint64_t memoryBytes() const { return m_some->memoryBytes(); }
+
+  const LayerRenderer& renderer() const { return *m_some; }
 
   // Of one pass [s].
   double seconds(const estimators::InscatterSource* source) const {
@@ -112,10 +120,10 @@ void predict(const SceneFile& scene, const RenderRequest& request, FrameSetup& s
   const RayCost rays(scene, setup);
   plan.memory.shadows = rays.memoryBytes();
   Light first, last;
-  if (storesLight(scene, setup)) {
+  if (storesLight(scene, setup) || setup.lightPaths) {
     const bool cached = !scene.estimator.text("cache").empty();
     if (!cached) setup.photons = std::min(wanted, kFirstPhotons);
-    first = traceLight(scene, request, setup);
+    first = traceLight(scene, request, rays.renderer(), setup);
     double trace = first.trace, march = rays.seconds(first.source.get());
     const double marchFirst = march;
     if (cached) {
@@ -125,17 +133,17 @@ void predict(const SceneFile& scene, const RenderRequest& request, FrameSetup& s
     }
     while (!cached && setup.photons < wanted) {
       setup.photons = std::min(wanted, setup.photons * 4);
-      last = traceLight(scene, request, setup);
+      last = traceLight(scene, request, rays.renderer(), setup);
       if (last.trace - first.trace > kLongEnough) break;
     }
-    if (last.source) {
+    if (last.photons > 0) {
       trace = extrapolate(first, first.trace, last, last.trace, wanted);
       march = rays.seconds(last.source.get());
       // A photon map takes longer to look up the more it holds.
       if (setup.photonMap) march = extrapolate(first, marchFirst, last, march, wanted);
     }
     s.trace = trace * parts;
-    if (!cached) s.resolve = (last.source ? last.resolve : first.resolve) * parts;
+    if (!cached) s.resolve = (last.photons > 0 ? last.resolve : first.resolve) * parts;
     s.march = rays.before() + march * parts;
     setup.photons = wanted;
   } else {

@@ -138,7 +138,7 @@ std::span<const Param> estimatorParams() {
        .unit = "",
        .defaultText = "photosphere",
        .help = "what answers for light that scattered more than once",
-       .choices = "photosphere|photon_map|path_traced|single"},
+       .choices = "photosphere|photon_map|path_traced|light_traced|single"},
       {.name = "preset",
        .type = ParamType::text,
        .unit = "",
@@ -325,7 +325,8 @@ std::span<const Param> estimatorParams() {
        .type = ParamType::integer,
        .unit = "",
        .defaultText = "256",
-       .help = "path_traced: paths a pixel",
+       .help = "path_traced: paths a pixel; light_traced: paths from the eye, for light that "
+               "scattered once, and as many from the lamps",
        .min = 1,
        .max = 1e6},
       {.name = "max_scatter",

@@ -88,6 +88,21 @@ TEST_F(MovingScene, PathsAndPhotonsAgree) {
   EXPECT_EQ(photons.statistics.majorantViolations + truth.statistics.majorantViolations, 0u);
 }
 
+TEST_F(MovingScene, IsNotForPathsFromTheLamps) {
+  const std::vector<std::string> sets{"volume.0.velocity=v", "estimator.type=light_traced"};
+  try {
+    renderScene(make(sets), 1);
+    FAIL();
+  } catch (const ConfigError& error) {
+    EXPECT_TRUE(contains(error.what(), "effects.motion_blur"));
+  }
+  std::vector<std::string> still = sets;
+  still.insert(still.end(), {"effects.motion_blur=off", "estimator.samples=8"});
+  const FrameResult frame = renderScene(make(still), 1);
+  EXPECT_GT(frame.statistics.photonsEmitted, 0u);
+  EXPECT_GT(frame.statistics.seconds.trace, 0.0);
+}
+
 TEST_F(MovingScene, MovesOnlyWhereItIsSeenOrAskedFor) {
   const auto setup = [&](const std::vector<std::string>& sets, double speed = 12.0) {
     return setUpFrame(make(sets, speed), 1);

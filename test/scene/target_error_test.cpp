@@ -134,6 +134,7 @@ TEST_F(TargetError, TheEstimateIsTheErrorThatThereIs) {
   const FrameResult truth = render({"estimator.type=path_traced", "estimator.samples=4000"});
   const std::vector<std::string> ways[] = {
       {"estimator.type=path_traced", "estimator.samples=32"},
+      {"estimator.type=light_traced", "estimator.samples=32"},
       {"estimator.type=photosphere", "estimator.photons=20000"},
       {"estimator.type=photosphere", "estimator.photons=400000", "estimator.radius=0.5"},
       {"estimator.type=photon_map", "estimator.photons=40000"},

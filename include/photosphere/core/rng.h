@@ -19,6 +19,7 @@ enum class RandomStream : std::uint32_t {
   merge = 5,
   importance = 6,
   visibility = 7,
+  connection = 8,
   test = 99,
 };
 

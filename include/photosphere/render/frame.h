@@ -60,6 +60,9 @@ struct FrameLayers {
   int height() const { return crop.max.y - crop.min.y; }
 };
 
+/// Puts another layer of multiple scattering into a frame and its beauty.
+void setMultiple(FrameLayers& layers, std::vector<Rgb> multiple);
+
 /// `Z` of a pixel without smoke: far and finite.
 inline constexpr float kNoDepth = 1e10f;
 

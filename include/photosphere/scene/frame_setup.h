@@ -64,6 +64,8 @@ struct FrameSetup {
   std::shared_ptr<const transport::PhotonGuide> guide;   ///< null = photons are not steered
   std::optional<estimators::PhotonMapLayout> photonMap;  ///< of type `photon_map`; radius chosen
   std::uint64_t photonMapPhotons = 0;                    ///< that one pass is expected to store
+  /// Multiple scattering is found by paths from the lamps (estimator.type = "light_traced").
+  bool lightPaths = false;
   /// Parts that photons and samples are shared out to where the frame's error is wanted: their
   /// spread tells it. More follow until it is small enough.
   int batches = 1;

@@ -1,0 +1,222 @@
+// Paths from the lamps against paths from the eye, and against what every frame of them must hold.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+
+#include "photosphere/core/parallel.h"
+#include "photosphere/core/registry.h"
+#include "photosphere/render/light_paths.h"
+#include "support/frames.h"
+#include "support/support.h"
+
+namespace photosphere::test {
+namespace {
+
+using render::FrameLayers;
+
+render::Crop whole(const cameras::Camera& camera) {
+  return {Vec2i(0), camera.resolution()};
+}
+
+std::vector<Rgb> lightPaths(const TestScene& scene, std::uint64_t photons, std::uint64_t seed,
+                            const render::Lens& lens = {}) {
+  render::LightPathOptions options;
+  options.photons = photons;
+  options.key = RandomKey::fromSeed(seed, 0);
+  options.crop = whole(*scene.camera);
+  options.lens = lens;
+  transport::TraceStatistics statistics;
+  return render::traceLightPaths(*scene.camera, *scene.medium, scene.lights, options, statistics);
+}
+
+std::vector<Rgb> eyePaths(const TestScene& scene, int samples, std::uint64_t seed,
+                          const render::Lens& lens = {}) {
+  const auto path = render::makePathIntegrator(*scene.medium, scene.lights, {});
+  render::FrameOptions options;
+  options.samples = samples;
+  options.key = RandomKey::fromSeed(seed, 0);
+  options.crop = whole(*scene.camera);
+  options.lens = lens;
+  return render::renderFrame(*scene.camera, *path, options).multiple;
+}
+
+// Means over blocks of pixels of several frames, and the errors of these means.
+struct Blocks {
+  std::vector<double> mean, error;
+};
+
+template <class Render>
+Blocks blocksOf(const cameras::Camera& camera, int edge, int seeds, int channel,
+                const Render& render) {
+  const Vec2i size = camera.resolution();
+  const Vec2i count = (size + edge - 1) / edge;
+  std::vector<double> sum(static_cast<std::size_t>(count.x * count.y)), squares(sum.size());
+  for (int seed = 1; seed <= seeds; ++seed) {
+    const std::vector<Rgb> frame = render(static_cast<std::uint64_t>(seed));
+    std::vector<double> block(sum.size());
+    for (int y = 0; y < size.y; ++y)
+      for (int x = 0; x < size.x; ++x)
+        block[static_cast<std::size_t>(y / edge * count.x + x / edge)] +=
+            static_cast<double>(frame[static_cast<std::size_t>(y * size.x + x)][channel]);
+    for (std::size_t i = 0; i < sum.size(); ++i) {
+      const double mean = block[i] / (edge * edge);
+      sum[i] += mean / seeds;
+      squares[i] += mean * mean / seeds;
+    }
+  }
+  Blocks blocks{sum, {}};
+  for (std::size_t i = 0; i < sum.size(); ++i)
+    blocks.error.push_back(std::sqrt(std::max(0.0, squares[i] - sum[i] * sum[i]) / (seeds - 1)));
+  return blocks;
+}
+
+// Both ways agree in every block, and in the mean to `close`.
+void expectAgreement(const TestScene& scene, std::uint64_t photons, int samples, double close,
+                     const render::Lens& lens = {}, int channel = 1) {
+  constexpr int kSeeds = 8, kEdge = 8;
+  const cameras::Camera& camera = *scene.camera;
+  const Blocks ours = blocksOf(camera, kEdge, kSeeds, channel, [&](std::uint64_t seed) {
+    return lightPaths(scene, photons, seed, lens);
+  });
+  const Blocks theirs = blocksOf(camera, kEdge, kSeeds, channel, [&](std::uint64_t seed) {
+    return eyePaths(scene, samples, 100 + seed, lens);
+  });
+  double a = 0, b = 0, noise = 0;
+  for (std::size_t i = 0; i < ours.mean.size(); ++i) {
+    a += ours.mean[i];
+    b += theirs.mean[i];
+    const double error = std::hypot(ours.error[i], theirs.error[i]);
+    noise += error * error;
+    // Student's t of seven degrees: beyond 7 one block in 5000.
+    EXPECT_NEAR(ours.mean[i], theirs.mean[i], 7 * error + 0.003 * theirs.mean[i] + 1e-12)
+        << "block " << i;
+  }
+  ASSERT_GT(b, 0);
+  EXPECT_NEAR(a / b, 1.0, 4 * std::sqrt(noise) / b + 1e-4);
+  EXPECT_LT(4 * std::sqrt(noise) / b, close);  // or the agreement says little
+}
+
+TestScene coneOfSmoke(double g, const Rgb& tint = Rgb(1.0f)) {
+  transport::MediumVolume smoke = sampledVolume(1.0, 24, {0.9, g, 8.0}, [](const Vec3d& p) {
+    return std::max(0.0, 1 - 2 * glm::length(p - Vec3d(0.05, 0.0, -0.1)));
+  });
+  smoke.tint = tint;
+  return plumeScene(std::move(smoke), 32);
+}
+
+std::uint64_t photons(double millions) {
+  return static_cast<std::uint64_t>(millions * (kSanitized ? 1e5 : 1e6));
+}
+int paths(int count) {
+  return std::max(8, kSanitized ? count / 10 : count);
+}
+constexpr double kClose = kSanitized ? 0.08 : 0.03;
+
+TEST(LightPaths, AreThePictureOfPathsFromTheEye) {
+  expectAgreement(coneOfSmoke(0.0), photons(0.15), paths(150), kClose);
+  expectAgreement(coneOfSmoke(0.6), photons(0.15), paths(150), kClose);
+}
+
+TEST(LightPaths, AgreeWhereChannelsDiffer) {
+  const TestScene scene = coneOfSmoke(0.3, Rgb(0.3f, 0.7f, 1.0f));
+  for (const int channel : {0, 2})
+    expectAgreement(scene, photons(0.15), paths(150), 2 * kClose, {}, channel);
+}
+
+TEST(LightPaths, AgreeWithALampInsideAndSeveralOutside) {
+  TestScene scene = coneOfSmoke(0.4);
+  scene.lights.push_back(
+      makeLight("point", {{"position", "[0.05, 0.02, -0.1]"}, {"intensity", "0.5"}}));
+  scene.lights.push_back(makeLight("environment", {{"color", "[0.1, 0.2, 0.3]"}}));
+  expectAgreement(scene, photons(0.15), paths(500), 2 * kClose);
+}
+
+std::unique_ptr<cameras::Camera> cameraOf(const std::string& model, const Mat4d& place,
+                                          const Vec2i& resolution,
+                                          const std::map<std::string, std::string>& options) {
+  const auto& plugin = findPlugin(cameras::cameraModels(), model, "camera", "test");
+  ParamValues values(plugin.params);
+  for (const auto& [name, value] : options)
+    values.setText(name, value, "test");
+  return plugin.create(values, place, resolution);
+}
+
+TEST(LightPaths, AgreeInParallelRaysThatBeginInTheSmoke) {
+  TestScene scene = coneOfSmoke(0.2);
+  scene.camera = cameraOf("orthographic", cameras::lookAt({1, -2, 1}, Vec3d(0.0), {0, 0, 1}),
+                          {40, 24}, {{"width", "1.3"}, {"near", "2.4"}});
+  expectAgreement(scene, photons(0.15), paths(150), kClose);
+}
+
+// The smoke lies around the lower pole and across the border behind the eye.
+TEST(LightPaths, AgreeInAPanorama) {
+  TestScene scene = coneOfSmoke(0.2);
+  scene.camera =
+      cameraOf("equirectangular", cameras::lookAt({0.1, 0, 0.75}, {0.9, 0.1, 0.75}, {0, 0, 1}),
+               {48, 24}, {});
+  expectAgreement(scene, photons(0.3), paths(200), 2 * kClose);
+}
+
+TEST(LightPaths, CarryTheLightOfGlowingSmoke) {
+  transport::MediumVolume smoke = sampledVolume(1.0, 24, {0.9, 0.3, 8.0}, [](const Vec3d& p) {
+    return std::max(0.0, 1 - 2 * glm::length(p));
+  });
+  smoke.emission = sampledEmission(1.0, 24, [](const Vec3d& p) {
+    return Rgb(std::max(0.0f, static_cast<float>(1 - 3 * glm::length(p - Vec3d(0.1, 0, 0)))));
+  });
+  TestScene scene = plumeScene(std::move(smoke), 32);
+  scene.lights.clear();
+  expectAgreement(scene, photons(0.15), paths(150), kClose);
+}
+
+TEST(LightPaths, AgreeThroughALens) {
+  expectAgreement(coneOfSmoke(0.2), photons(0.15), paths(150), kClose, {0.25, 2.4});
+}
+
+// Smoke that only scatters looks like the even surroundings that it stands in.
+TEST(LightPaths, FillAFurnace) {
+  TestScene scene = plumeScene(
+      sampledVolume(1.0, 24, {1.0, 0.5, 6.0},
+                    [](const Vec3d& p) { return std::max(0.0, 1 - 2 * glm::length(p)); }),
+      32);
+  scene.lights.clear();
+  scene.lights.push_back(makeLight("environment", {{"color", "[1, 1, 1]"}}));
+  const auto path = render::makePathIntegrator(*scene.medium, scene.lights, {});
+  render::FrameOptions options;
+  options.samples = paths(400);
+  options.crop = whole(*scene.camera);
+  FrameLayers frame = render::renderFrame(*scene.camera, *path, options);
+  render::setMultiple(frame, lightPaths(scene, photons(2), 1));
+  const BlockDeviation furnace = deviationFromOne(frame.beauty, frame.width(), 8);
+  EXPECT_NEAR(furnace.mean, 1.0, kSanitized ? 0.01 : 0.002);
+  EXPECT_LT(furnace.worst, kSanitized ? 0.05 : 0.015);
+}
+
+TEST(LightPaths, AreTheSameBitsForAnyNumberOfThreadsAndCrop) {
+  const TestScene scene = coneOfSmoke(0.3);
+  std::vector<Rgb> first;
+  for (const int threads : {1, 3}) {
+    const ThreadLimit limit(threads);
+    const std::vector<Rgb> frame = lightPaths(scene, 20'000, 5);
+    if (first.empty())
+      first = frame;
+    else
+      EXPECT_EQ(frame, first);
+  }
+  render::LightPathOptions options;
+  options.photons = 20'000;
+  options.key = RandomKey::fromSeed(5, 0);
+  options.crop = {{7, 9}, {20, 30}};
+  transport::TraceStatistics statistics;
+  const std::vector<Rgb> part =
+      render::traceLightPaths(*scene.camera, *scene.medium, scene.lights, options, statistics);
+  for (int y = 9; y < 30; ++y)
+    for (int x = 7; x < 20; ++x)
+      EXPECT_EQ(part[static_cast<std::size_t>((y - 9) * 13 + x - 7)],
+                first[static_cast<std::size_t>(y * 32 + x)]);
+}
+
+}  // namespace
+}  // namespace photosphere::test
