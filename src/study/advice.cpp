@@ -14,7 +14,8 @@ namespace photosphere::study {
 namespace {
 
 bool isPhotosphere(const std::string& family) {
-  return family != "path_traced" && family != "single" && family.rfind("photon_map", 0) != 0;
+  return family != "path_traced" && family != "light_traced" && family != "single" &&
+         family.rfind("photon_map", 0) != 0;
 }
 
 struct Best {
@@ -145,8 +146,9 @@ void addReferenceChecks(const StudyResult& result, std::vector<std::string>& out
     const double claimed = sweep.reference.noise[kMultiple];
     if (spread > 3 * claimed)
       out.push_back(fmt::format(
-          "{}: the reference is not to be relied on in layer multiple: from the spread of path "
-          "traced frames its relMSE should be about {:.2g}, where its own halves say {:.2g}; rare "
+          "{}: the reference is not to be relied on in layer multiple: from the spread of "
+          "contenders like it its relMSE should be about {:.2g}, where its own halves say {:.2g}; "
+          "rare "
           "bright paths are still missing. Give it more --minutes.",
           sweep.name, spread, claimed));
     else if (!sweep.reference.targetReached)

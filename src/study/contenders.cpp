@@ -68,6 +68,7 @@ const std::vector<Family>& families() {
        "photon map, 8 progressive passes",
        {"estimator.type=photon_map", "estimator.passes=8"}},
       {"path_traced", "path tracing", {"estimator.type=path_traced"}, Work::samples},
+      {"light_traced", "light tracing", {"estimator.type=light_traced"}, Work::samples},
       {"until_error",
        "photosphere, until its estimated error",
        {"estimator.photons=200000", "render.time_limit=10"},
@@ -102,7 +103,7 @@ SweepSize SweepSize::hardCase(bool quick) {
                  {16, 256},
                  {10, 20},
                  {"view", "view_smoothed", "histogram_32", "particles_view", "photon_map",
-                  "path_traced", "until_error", "single"}};
+                  "path_traced", "light_traced", "until_error", "single"}};
   if (quick) size = {{1'000}, {2}, {2}, {"view", "path_traced", "until_error"}};
   return size;
 }

@@ -96,12 +96,13 @@ class FlickerMeter {
 
   ReferenceMaker referenceOf(std::int64_t frame) {
     const scene::SceneFile base = m_plan.scene.open();
-    std::vector<std::string> truth = neutralEstimator(base);
-    truth.emplace_back("estimator.type=path_traced");
     const SceneFacts facts = sceneFacts(base, frame);
-    return {m_plan.scene.open(truth), frame,
-            m_plan.referenceName,     referenceKey(base, frame, facts.mediumHash),
-            m_plan.cacheFolder,       m_plan.chunk};
+    return {m_plan.scene.with(neutralEstimator(base)),
+            frame,
+            m_plan.referenceName,
+            referenceKey(base, frame, facts.mediumHash),
+            m_plan.cacheFolder,
+            m_plan.chunk};
   }
 
   void measure(const Shot& shot, const Contender& c, bool perFrame, std::vector<FlickerRow>& rows) {

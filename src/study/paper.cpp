@@ -192,7 +192,7 @@ class Paper {
     for (const std::string& set : frame.sets)
       if (set.rfind("light.", 0) == 0) source.sets.push_back(set);
     const scene::SceneFile base = source.open();
-    ReferenceMaker maker(source.open({"estimator.type=path_traced"}), frame.frame, id,
+    ReferenceMaker maker(source, frame.frame, id,
                          referenceKey(base, frame.frame, sceneFacts(base, frame.frame).mediumHash),
                          m_cache, m_options.quick ? 4 : 64);
     const Stopwatch watch;

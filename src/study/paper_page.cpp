@@ -104,7 +104,7 @@ std::string page(const PaperResult& result, const PictureSettings& settings) {
           "The photosphere has estimator.preset = \"paper\": the settings of the paper with its "
           "errata corrected. Seconds are those of resolve and march, as the paper times rendering "
           "and not tracing; medians over independent seeds. Ratios are over the first line of "
-          "each exhibit, ours beside the paper's. References are path traced.") +
+          "each exhibit, ours beside the paper's. References are made of paths.") +
       "</p>\n";
   for (const PaperExhibit& e : result.exhibits) {
     body += "<h2>" + escape(e.name + ": " + e.title) + "</h2>\n";

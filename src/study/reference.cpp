@@ -24,7 +24,11 @@ constexpr std::array<const char*, 2> kMeanLayers{"", "multiple"};
 constexpr std::array<const char*, 2> kVarianceLayers{"variance", "multiple_variance"};
 constexpr const char* kSamples = "photosphere:samples";
 constexpr const char* kPairs = "photosphere:pairs";
+constexpr const char* kMethod = "photosphere:method";
 constexpr const char* kKey = "photosphere:reference_key";
+
+// Paths from the eye serve every scene.
+constexpr std::array<const char*, 2> kMethods{"path_traced", "light_traced"};
 
 // Seeds of chunks lie far from those that people choose for frames.
 constexpr std::int64_t kFirstSeed = 7'000'000'000;
@@ -146,9 +150,10 @@ void writeReference(const fs::path& path, const ReferenceImage& reference, const
   image::ExrAttributes attributes;
   attributes[kSamples] = std::to_string(reference.samples);
   attributes[kPairs] = std::to_string(reference.pairs);
+  attributes[kMethod] = reference.method;
   attributes[kKey] = key;
   attributes["comments"] = std::string(
-      "Path-traced reference of photosphere study: mean (R, G, B, multiple, transmittance) and "
+      "Reference of photosphere study: mean (R, G, B, multiple, transmittance) and "
       "variance of that mean (variance, multiple_variance)");
   // What was read back and goes on has lost its channels' kinds; half would lose small variances.
   image::ExrOptions options;
@@ -169,6 +174,15 @@ std::optional<ReferenceImage> readReference(const fs::path& path, const std::str
   ReferenceImage reference;
   reference.samples = countAttribute(path, file.attributes, kSamples);
   reference.pairs = countAttribute(path, file.attributes, kPairs);
+  // Files without it are older than the choice.
+  if (const auto method = file.attributes.find(kMethod); method != file.attributes.end())
+    if (const std::string* name = std::get_if<std::string>(&method->second))
+      reference.method = *name;
+  if (std::find(kMethods.begin(), kMethods.end(), reference.method) == kMethods.end())
+    throw InputError(path.string(),
+                     fmt::format("is a reference made in an unknown way, '{}'; delete the file to "
+                                 "render it anew",
+                                 reference.method));
   const image::Image wanted = emptyReference(file.image.width(), file.image.height());
   for (const image::Channel& channel : wanted.channels())
     if (!file.image.has(channel.name))
@@ -179,14 +193,57 @@ std::optional<ReferenceImage> readReference(const fs::path& path, const std::str
   return reference;
 }
 
-ReferenceMaker::ReferenceMaker(scene::SceneFile pathTraced, std::int64_t frame,
+std::array<double, 2> roughNoise(const ReferenceImage& a, const ReferenceImage& b) {
+  constexpr int kEdge = 8;
+  constexpr double kUnlikely = 4;  // two standard errors
+  const int width = a.pixels.width(), height = a.pixels.height();
+  std::array<double, 2> sum{};
+  for (std::size_t layer = 0; layer < kLayers.size(); ++layer) {
+    const Planes means[] = {a.mean(layer), b.mean(layer)};
+    const Planes variances[] = {a.variance(layer), b.variance(layer)};
+    for (std::size_t c = 0; c < means[0].size(); ++c) {
+      // Sums over pixels [x0, x1) of [y0, y1).
+      const auto total = [&](const Planes& planes, int x0, int y0, int x1, int y1) {
+        double all = 0;
+        for (int y = y0; y < y1; ++y)
+          for (int x = x0; x < x1; ++x)
+            all += static_cast<double>(planes[c][static_cast<std::size_t>(y * width + x)]);
+        return all;
+      };
+      const double whole =
+          0.5 * (total(means[0], 0, 0, width, height) + total(means[1], 0, 0, width, height)) /
+          (static_cast<double>(width) * height);
+      for (int y = 0; y < height; y += kEdge)
+        for (int x = 0; x < width; x += kEdge) {
+          const int x1 = std::min(x + kEdge, width), y1 = std::min(y + kEdge, height);
+          const double n = (x1 - x) * (y1 - y);
+          const double first = total(means[0], x, y, x1, y1) / n,
+                       second = total(means[1], x, y, x1, y1) / n;
+          const double own[] = {total(variances[0], x, y, x1, y1),
+                                total(variances[1], x, y, x1, y1)};
+          const double missed = std::max(
+              0.0, (first - second) * (first - second) - kUnlikely * (own[0] + own[1]) / (n * n));
+          const double scale = 0.5 * (first + second) + whole;
+          if (!(scale > 0)) continue;
+          for (const std::size_t which : {0u, 1u})
+            sum[which] += (own[which] + ((first < second) == (which == 0) ? n * missed : 0.0)) /
+                          (scale * scale);
+        }
+    }
+  }
+  const double values = 6.0 * width * height;
+  return {sum[0] / values, sum[1] / values};
+}
+
+ReferenceMaker::ReferenceMaker(const SceneSource& truth, std::int64_t frame,
                                const std::string& name, std::string key, fs::path folder, int chunk)
-    : m_scene(std::move(pathTraced)),
-      m_frame(frame),
+    : m_frame(frame),
       m_key(std::move(key)),
       m_folder(std::move(folder)),
       m_file(m_folder / fmt::format("{}-{}.exr", fileStem(name), m_key)),
       m_chunk(chunk) {
+  for (const char* type : kMethods)
+    m_methods.push_back({type, truth.open({std::string("estimator.type=") + type})});
   // Another scene's study may have made it under that scene's name.
   if (const fs::path found = referenceIn(m_folder, m_key); !found.empty()) m_file = found;
   load(m_file);
@@ -203,26 +260,63 @@ void ReferenceMaker::load(const fs::path& path) {
   log::info("reference: {} has {} samples a pixel", m_origin, m_image.samples);
 }
 
-void ReferenceMaker::addPair() {
-  const Stopwatch watch;
+bool ReferenceMaker::addPair(const Method& method, bool mayFail, ReferenceImage& image) const {
   image::Image halves[2];
   for (int half = 0; half < 2; ++half) {
     RenderJob job;
-    job.scene = m_scene;
+    job.scene = method.scene;
     job.scene.estimator.set("samples", static_cast<std::int64_t>(m_chunk), "reference");
     job.frame = m_frame;
-    job.request.seed = kFirstSeed + 2 * static_cast<std::int64_t>(m_image.pairs) + half;
+    job.request.seed = kFirstSeed + 2 * static_cast<std::int64_t>(image.pairs) + half;
     // Two studies may share this folder.
     const Scratch scratch(m_folder / fmt::format(".chunk-{}-{}.exr", m_key, getpid()));
     job.image = scratch.path;
     const RenderOutcome outcome = renderInChild(job);
+    if (outcome.failed && mayFail) return false;
     if (outcome.failed) throw Error(outcome.code, "reference: " + outcome.message);
     halves[half] = image::readExr(job.image).image;
   }
-  study::addPair(m_image, halves[0], halves[1], static_cast<std::uint64_t>(m_chunk));
+  study::addPair(image, halves[0], halves[1], static_cast<std::uint64_t>(m_chunk));
+  return true;
+}
+
+std::optional<ReferenceImage> ReferenceMaker::firstPair(const Method& method, bool mayFail,
+                                                        double& seconds) const {
+  ReferenceImage image;
+  image.method = method.type;
+  const Stopwatch watch;
+  if (!addPair(method, mayFail, image)) return std::nullopt;
+  seconds = watch.seconds();
+  return image;
+}
+
+// A pair by each method; that of the one which is quieter in the same time stays.
+void ReferenceMaker::begin() {
+  std::array<double, 2> seconds{};
+  m_image = *firstPair(m_methods[0], false, seconds[0]);
+  m_pairSeconds = seconds[0];
+  const auto other = firstPair(m_methods[1], true, seconds[1]);
+  if (!other) return;
+  const std::array<double, 2> noise = roughNoise(m_image, *other);
+  for (std::size_t i : {0, 1})
+    log::debug("reference: {}: noise {:.3g} in {:.3g} s", m_methods[i].type, noise[i], seconds[i]);
+  if (!(noise[1] * seconds[1] < noise[0] * seconds[0])) return;
+  m_image = *other;
+  m_pairSeconds = seconds[1];
+}
+
+void ReferenceMaker::addPair() {
+  const Stopwatch watch;
+  if (m_image.empty()) {
+    begin();
+  } else {
+    const auto method = std::find_if(m_methods.begin(), m_methods.end(),
+                                     [&](const Method& m) { return m.type == m_image.method; });
+    addPair(*method, false, m_image);
+    m_pairSeconds = watch.seconds();
+  }
   writeReference(m_file, m_image, m_key);
-  m_pairSeconds = watch.seconds();
-  m_seconds += m_pairSeconds;
+  m_seconds += watch.seconds();
 }
 
 std::string fileStem(const std::string& text) {

@@ -1,6 +1,6 @@
 #pragma once
-// The path-traced truth of a scene: rendered in pairs of independent chunks, kept on disk after
-// each, so that it can be interrupted, continued and reused.
+// The truth of a scene, by paths from the eye or from the lamps: rendered in pairs of independent
+// chunks, kept on disk after each, so that it can be interrupted, continued and reused.
 
 #include <array>
 #include <cstdint>
@@ -12,6 +12,7 @@
 #include "photosphere/image/image.h"
 #include "photosphere/scene/scene_file.h"
 #include "photosphere/study/statistics.h"
+#include "scene_source.h"
 
 namespace photosphere::study {
 
@@ -22,6 +23,7 @@ struct ReferenceImage {
   image::Image pixels;  ///< layers total, multiple, transmittance, variance, multiple_variance
   std::uint64_t samples = 0;  ///< a pixel
   std::uint64_t pairs = 0;
+  std::string method = "path_traced";  ///< estimator.type that it is made with
 
   bool empty() const { return samples == 0; }
   Planes mean(std::size_t layer) const;      ///< R, G, B of kLayers[layer]
@@ -43,14 +45,23 @@ void writeReference(const std::filesystem::path& path, const ReferenceImage& ref
 std::optional<ReferenceImage> readReference(const std::filesystem::path& path,
                                             const std::string& key);
 
-/// Grows the reference of one scene and frame.
+/// Noise of two young references of one picture by different methods, which their own variances
+/// tell in part: rare bright paths that a method has not yet met leave its pixels dark and their
+/// variance small. Where the two differ by more than their variances explain, the darker one is
+/// taken to have missed that. Mean over pixels, channels and both layers of the squared error, over
+/// the square of their mean there and over the frame.
+std::array<double, 2> roughNoise(const ReferenceImage& a, const ReferenceImage& b);
+
+/// Grows the reference of one scene and frame, by paths from the eye or from the lamps: whichever
+/// is quieter in the same time, which the first pair of each tells.
 class ReferenceMaker {
  public:
   /// Starts from `folder`, else from the references shipped in data/studies, where one has that
   /// key.
+  /// @param truth   the scene, with an estimator of defaults but for its type
   /// @param name    begins the file's name; letters, digits, - and _ of it are kept
   /// @param chunk   paths a pixel of each half of a pair
-  ReferenceMaker(scene::SceneFile pathTraced, std::int64_t frame, const std::string& name,
+  ReferenceMaker(const SceneSource& truth, std::int64_t frame, const std::string& name,
                  std::string key, std::filesystem::path folder, int chunk);
 
   const ReferenceImage& image() const { return m_image; }
@@ -66,9 +77,18 @@ class ReferenceMaker {
   void addPair();
 
  private:
+  struct Method {
+    std::string type;
+    scene::SceneFile scene;
+  };
   void load(const std::filesystem::path& path);
+  void begin();
+  std::optional<ReferenceImage> firstPair(const Method& method, bool mayFail,
+                                          double& seconds) const;
+  /// @return false when that method does not serve the scene
+  bool addPair(const Method& method, bool mayFail, ReferenceImage& image) const;
 
-  scene::SceneFile m_scene;
+  std::vector<Method> m_methods;
   std::int64_t m_frame;
   std::string m_key, m_origin;
   std::filesystem::path m_folder, m_file;

@@ -57,8 +57,9 @@ std::string definitions() {
              "the difference from the reference; relative error is its root. Layer multiple is "
              "light "
              "scattered twice or more, layer total the whole picture. Smoke only are pixels whose "
-             "reference transmittance is below 0.99. The reference is path traced in pairs of "
-             "independent halves; what its own noise adds is subtracted, so that a value may come "
+             "reference transmittance is below 0.99. The reference is made of paths from the "
+             "eye or from the lamps, whichever is quieter, in pairs of independent halves; what "
+             "its own noise adds is subtracted, so that a value may come "
              "out slightly below 0.") +
          paragraph(
              "Bias and variance come from independent seeds: variance is what differs between "

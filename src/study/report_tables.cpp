@@ -245,14 +245,14 @@ Table leftOutTable(const StudyResult& result) {
 
 Table referenceTable(const StudyResult& result) {
   Table table;
-  table.caption =
-      "References: path traced, their noise as relMSE over all pixels (it is subtracted)";
-  table.rows.push_back({"sweep", "samples a pixel", "of them found", "seconds spent",
-                        "noise, total", "noise, multiple", "by path traced frames",
+  table.caption = "References: their noise as relMSE over all pixels (it is subtracted)";
+  table.rows.push_back({"sweep", "paths from", "paths a pixel", "of them found", "seconds spent",
+                        "noise, total", "noise, multiple", "by contenders' spread",
                         "a tenth of the best or less", "key"});
   for (const SweepResult* sweep : allSweeps(result)) {
     const ReferenceNote& r = sweep->reference;
-    table.rows.push_back({sweep->name, std::to_string(r.samples), std::to_string(r.samplesBefore),
+    table.rows.push_back({sweep->name, r.method == "light_traced" ? "the lamps" : "the eye",
+                          std::to_string(r.samples), std::to_string(r.samplesBefore),
                           fmt::format("{:.1f}", r.seconds), fmt::format("{:.2g}", r.noise[kTotal]),
                           fmt::format("{:.2g}", r.noise[kMultiple]),
                           fmt::format("{:.2g}", r.pathNoise[kMultiple]),

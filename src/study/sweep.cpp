@@ -69,11 +69,9 @@ Sweep::Sweep(SweepPlan plan) : m_plan(std::move(plan)) {
     scene::SceneFile scene = m_plan.scene.open(c.sets);
     m_entries.push_back({std::move(c), std::move(scene), {}, {}, false});
   }
-  std::vector<std::string> truth = neutralEstimator(m_base);
-  truth.emplace_back("estimator.type=path_traced");
-  m_reference.emplace(m_plan.scene.open(truth), m_plan.frame, m_plan.referenceName,
-                      referenceKey(m_base, m_plan.frame, m_facts.mediumHash), m_plan.cacheFolder,
-                      m_plan.chunk);
+  m_reference.emplace(m_plan.scene.with(neutralEstimator(m_base)), m_plan.frame,
+                      m_plan.referenceName, referenceKey(m_base, m_plan.frame, m_facts.mediumHash),
+                      m_plan.cacheFolder, m_plan.chunk);
 }
 
 void Sweep::leaveOut(Entry& entry, const std::string& why) {
@@ -198,7 +196,8 @@ std::array<double, 2> Sweep::pathNoise() const {
   const ReferenceImage& reference = m_reference->image();
   const Entry* path = nullptr;
   for (const Entry& entry : m_entries)
-    if (!entry.dropped && entry.images.size() >= 2 && entry.contender.family->work == Work::samples)
+    if (!entry.dropped && entry.images.size() >= 2 &&
+        entry.contender.family->name == reference.method)
       path = &entry;  // levels ascend: the last has the most samples
   if (!path || reference.empty()) return noise;
   std::vector<image::Image> frames;
@@ -216,12 +215,12 @@ std::array<double, 2> Sweep::pathNoise() const {
   return noise;
 }
 
-double Sweep::stillNeeded() const {
+double Sweep::stillNeeded(const std::array<double, 2>& best) const {
   const ReferenceImage& reference = m_reference->image();
   if (reference.pairs < 2) return 2;  // a variance from one pair alone says too little
   // Outliers of the reference hide in their own denominators: the worse estimate counts.
   auto noise = reference.noise();
-  const auto spread = pathNoise(), best = bestErrors();
+  const auto spread = pathNoise();
   double factor = 0;
   for (std::size_t layer = 0; layer < kLayers.size(); ++layer)
     if (noise[layer] = std::max(noise[layer], spread[layer]); noise[layer] > 0)
@@ -229,15 +228,44 @@ double Sweep::stillNeeded() const {
   return factor;
 }
 
+namespace {
+
+// The best errors against what a reference was at some time.
+struct Look {
+  std::uint64_t pairs = 0;
+  std::array<double, 2> best{};
+};
+
+// Paths of which few bring nearly all the light leave most pixels of a young reference too dark,
+// and every contender far off: so far that its noise looks small beside that. It has its worth once
+// twice as many paths show the contenders no better.
+bool settled(const std::vector<Look>& looks) {
+  constexpr std::uint64_t kGrown = 16;  // pairs: taken at their word when they were here before
+  constexpr double kSteady = 0.8;
+  const Look& now = looks.back();
+  if (looks.front().pairs >= kGrown) return true;
+  const Look* before = nullptr;
+  for (const Look& look : looks)
+    if (2 * look.pairs <= now.pairs) before = &look;
+  for (std::size_t layer = 0; before && layer < kLayers.size(); ++layer)
+    if (now.best[layer] < kSteady * before->best[layer]) return false;
+  return before != nullptr;
+}
+
+}  // namespace
+
 void Sweep::refine() {
   const Stopwatch watch;
   Progress progress(m_plan.name + ": reference", kProgressParts);
   std::uint64_t reported = 0;
   const ReferenceImage& image = m_reference->image();
+  std::vector<Look> looks;
   while (true) {
-    const double factor = stillNeeded();
-    m_targetReached = factor <= 1;
+    if (image.pairs > 0) looks.push_back({image.pairs, bestErrors()});
+    double factor = looks.empty() ? 2 : stillNeeded(looks.back().best);
+    m_targetReached = factor <= 1 && settled(looks);
     if (m_targetReached) return;
+    factor = std::max(factor, 1.01);
     const double needed = factor * static_cast<double>(std::max<std::uint64_t>(1, image.pairs));
     // Look again after a quarter more samples: looking costs time as well.
     const auto lookAt = static_cast<std::uint64_t>(
@@ -311,9 +339,11 @@ SweepResult Sweep::evaluate() const {
   result.startMemoryBytes = m_startMemory;
   result.leftOut = m_leftOut;
   const ReferenceImage& reference = m_reference->image();
-  result.reference = {m_reference->key(), m_reference->origin(),  m_reference->samplesBefore(),
-                      reference.samples,  m_reference->seconds(), reference.noise(),
-                      pathNoise(),        m_targetReached};
+  result.reference = {m_reference->key(),    reference.method,
+                      m_reference->origin(), m_reference->samplesBefore(),
+                      reference.samples,     m_reference->seconds(),
+                      reference.noise(),     pathNoise(),
+                      m_targetReached};
   result.referenceImage = reference.pixels;
   const auto smoke = image::smokeMask(reference.pixels);
   // Family by family, where the entries go level by level.

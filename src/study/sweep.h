@@ -59,7 +59,8 @@ class Sweep {
   /// Least relMSE of a contender's first frame, [layer], over all pixels.
   std::array<double, 2> bestErrors() const;
 
-  double stillNeeded() const;
+  /// Times its paths that the reference needs. @param best  of bestErrors
+  double stillNeeded(const std::array<double, 2>& best) const;
   /// relMSE of the reference's noise as the spread of path traced frames foretells it, [layer].
   std::array<double, 2> pathNoise() const;
   bool strongest(const Entry& entry) const;

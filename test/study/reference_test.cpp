@@ -28,6 +28,26 @@ image::Image chunk(std::uint64_t seed, int samples, int edge = 8) {
   return image;
 }
 
+// Half of the pixels of `blind` have not met what every pixel should have: they are dark and sure
+// of it.
+TEST(Reference, DarkPixelsThatAreSureOfItAreNotQuiet) {
+  ReferenceImage seeing, blind;
+  addPair(seeing, chunk(1, 4), chunk(2, 4), 4);
+  image::Image half = chunk(3, 4000);
+  for (const char* layer : {"", "multiple"})
+    for (const char* letter : {"R", "G", "B"})
+      for (float& v : half.channel(image::Image::channelName(layer, letter)))
+        v *= (&v - half.channel(image::Image::channelName(layer, letter)).data()) % 2 ? 0.0f : 1.0f;
+  addPair(blind, half, half, 4);
+  const std::array<double, 2> noise = roughNoise(seeing, blind);
+  EXPECT_GT(noise[1], 3 * noise[0]);
+  // In turn; and by their own variances where they agree.
+  EXPECT_NEAR(roughNoise(blind, seeing)[0], noise[1], 1e-9);
+  ReferenceImage quiet;
+  addPair(quiet, chunk(5, 4000), chunk(6, 4000), 4000);
+  EXPECT_LT(10 * roughNoise(seeing, quiet)[1], roughNoise(seeing, quiet)[0]);
+}
+
 TEST(Reference, aPairGivesItsMeanAndTheVarianceOfThatMean) {
   const image::Image a = chunk(1, 4), b = chunk(2, 4);
   ReferenceImage reference;

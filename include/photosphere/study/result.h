@@ -76,11 +76,12 @@ struct LeftOut {
 /// What is known of the reference of a sweep.
 struct ReferenceNote {
   std::string key;
+  std::string method;  ///< estimator.type that it is made with
   std::string origin;  ///< file it was continued from; empty when rendered anew
   std::uint64_t samplesBefore = 0, samples = 0;  ///< a pixel, as found and in all
   double seconds = 0;                            ///< spent on it in this run
   std::array<double, 2> noise{};                 ///< relMSE of its own noise, [layer], all pixels
-  /// The same from the spread of path traced contenders, whose weights do not depend on the
+  /// The same from the spread of contenders of the reference's own method, whose weights do not depend on the
   /// reference's outliers; 0 where there are none.
   std::array<double, 2> pathNoise{};
   bool targetReached = false;  ///< noise at most a tenth of the best contender's relMSE
