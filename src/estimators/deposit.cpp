@@ -74,6 +74,7 @@ void VoxelSink::depositTrack(const B& basis, const typename B::Along& along, con
                              int set) const {
   m_lattice.walk(flight.origin, flight.direction, flight.length,
                  [&](std::size_t voxel, float entry, float length) {
+                   if (m_means && !((*m_means)[voxel] > 0.0f)) return;
                    // Where a voxel is entered, not how many came before: bits of rounding do not
                    // depend on which of them are stored.
                    std::uint32_t counter = std::bit_cast<std::uint32_t>(entry);
@@ -99,6 +100,7 @@ void VoxelSink::depositCollision(const B& basis, const typename B::Along& along,
   if (voxel < 0) return;
   std::uint32_t counter = 0;
   Rgb amount = flight.power / flight.extinctionAtEnd;
+  if (m_means && !((*m_means)[static_cast<std::size_t>(voxel)] > 0.0f)) return;
   if (m_weight) amount *= m_weight->at(static_cast<std::size_t>(voxel), p);
   m_carriers.add(basis, along, flight, static_cast<std::size_t>(voxel), set, amount, p, counter);
 }

@@ -60,9 +60,14 @@ class CarrierSums {
 class VoxelSink final : public transport::FlightSink {
  public:
   /// @param weight  of a place, which multiplies what is deposited there; nullptr = 1
+  /// @param means   of these over the voxels: nothing is deposited where they are 0; with `weight`
   VoxelSink(CarrierSums carriers, Deposit deposit, const transport::SupportLattice& lattice,
-            const VisibleWeight* weight = nullptr)
-      : m_carriers(std::move(carriers)), m_deposit(deposit), m_lattice(lattice), m_weight(weight) {}
+            const VisibleWeight* weight = nullptr, const std::vector<float>* means = nullptr)
+      : m_carriers(std::move(carriers)),
+        m_deposit(deposit),
+        m_lattice(lattice),
+        m_weight(weight),
+        m_means(means) {}
   void consume(std::span<const transport::Flight> flights) override;
 
  private:
@@ -77,6 +82,7 @@ class VoxelSink final : public transport::FlightSink {
   Deposit m_deposit;
   const transport::SupportLattice& m_lattice;
   const VisibleWeight* m_weight;
+  const std::vector<float>* m_means;
 };
 
 /// Deposits collisions on particles by eq. 7a or 7b.

@@ -64,9 +64,9 @@ class Tracing {
     const CarrierSums carriers(medium, lights, m_light.layout, view, options.key, m_sums);
     if (!m_light.layout.holdsPower()) {
       std::optional<VisibleWeight> weight;
-      if (weighsByTheEye(m_light.layout)) weight.emplace(medium, m_light.lattice, view);
-      VoxelSink sink(carriers, m_light.layout.deposit, m_light.lattice,
-                     weight ? &*weight : nullptr);
+      if (m_light.weights) weight.emplace(medium, m_light.lattice, view);
+      VoxelSink sink(carriers, m_light.layout.deposit, m_light.lattice, weight ? &*weight : nullptr,
+                     m_light.weights.get());
       return trace(medium, lights, options, sink);
     }
     const ParticleIndex index(m_light.particles, m_light.layout.depositRadius);
@@ -119,7 +119,8 @@ LightSums traceLightSums(const Medium& medium, const transport::LightList& light
                          const LightFieldLayout& layout, const View& view,
                          const std::vector<Vec3f>& particles,
                          const transport::TraceOptions& options, TraceStatistics& statistics,
-                         Checkpoint* checkpoint, std::uint64_t part) {
+                         std::shared_ptr<const std::vector<float>> weights, Checkpoint* checkpoint,
+                         std::uint64_t part) {
   checkLayout(layout);
   LightSums light;
   light.layout = layout;
@@ -135,6 +136,11 @@ LightSums traceLightSums(const Medium& medium, const transport::LightList& light
   }
   light.quantum = quantumOf(medium, lights, layout.holdsPower());
   if (!layout.holdsPower()) light.lattice = latticeOf(medium, layout, view);
+  if (weighsByTheEye(layout)) {
+    light.weights = std::move(weights);
+    if (!light.weights || light.weights->size() != light.lattice.size())
+      light.weights = eyeWeights(medium, light.lattice, view);
+  }
   statistics = Tracing(light, checkpoint, part).run(medium, lights, view, options);
   return light;
 }
@@ -156,6 +162,7 @@ LightField toField(LightSums light) {
   field.layout = light.layout;
   field.lattice = std::move(light.lattice);
   field.particles = std::move(light.particles);
+  field.weights = std::move(light.weights);
   field.photons = light.photons;
   field.farPhotons = light.farPhotons;
   const double edge = field.lattice.edge();

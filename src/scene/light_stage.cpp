@@ -113,9 +113,10 @@ estimators::LightSums lightSums(const RenderRequest& request, FrameSetup& setup,
   if (request.shard)
     std::tie(options.firstPhoton, options.photonCount) =
         estimators::photonsOf(*request.shard, setup.photons);
-  estimators::LightSums light =
-      estimators::traceLightSums(*setup.medium, setup.lights, setup.layout, setup.view,
-                                 setup.particles, options, traced, request.checkpoint, part);
+  estimators::LightSums light = estimators::traceLightSums(
+      *setup.medium, setup.lights, setup.layout, setup.view, setup.particles, options, traced,
+      setup.eyeWeights, request.checkpoint, part);
+  setup.eyeWeights = light.weights;
   addTraced(traced, statistics);
   statistics.photonsStored += storedPhotons(setup.layout, traced);
   if (light.farPhotons > 0)

@@ -58,11 +58,6 @@ PassLight prepareLight(const SceneFile& scene, const RenderRequest& request, int
   result.layout = describeLayout(setup.layout);
   result.radius = setup.layout.radius / setup.space.metersPerUnit;
   const Stopwatch watch;
-  if (estimators::weighsByTheEye(field.layout)) {
-    if (!setup.eyeWeights || setup.eyeWeights->size() != field.lattice.size())
-      setup.eyeWeights = estimators::eyeWeights(*setup.medium, field.lattice, setup.view);
-    field.weights = setup.eyeWeights;
-  }
   if (wider) light.wider = widened(setup, field);
   auto source = estimators::resolve(*setup.medium, std::move(field), setup.view, setup.key);
   result.statistics.seconds.resolve += watch.seconds();

@@ -17,10 +17,12 @@ struct LightSums {
   /// Where light is gathered: the carriers themselves, but for track lengths whose carriers are
   /// particles.
   transport::SupportLattice lattice;
-  std::vector<Vec3f> particles;    ///< positions, local space [m]; Carrier::particles
-  std::vector<std::int64_t> sums;  ///< [voxel or particle][set][bin][channel]
-  double quantum = 1.0;            ///< worth of one unit [W m], or [W] (holdsPower)
-  std::uint64_t photons = 0;       ///< of the whole frame
+  std::vector<Vec3f> particles;  ///< positions, local space [m]; Carrier::particles
+  /// eyeWeights of the lattice, for weighsByTheEye: nothing is left where they are 0.
+  std::shared_ptr<const std::vector<float>> weights;
+  std::vector<std::int64_t> sums;                  ///< [voxel or particle][set][bin][channel]
+  double quantum = 1.0;                            ///< worth of one unit [W m], or [W] (holdsPower)
+  std::uint64_t photons = 0;                       ///< of the whole frame
   std::uint64_t firstPhoton = 0, photonCount = 0;  ///< of these, those that are summed here
   std::uint64_t farPhotons = 0;                    ///< see LightField
 
@@ -29,6 +31,8 @@ struct LightSums {
 };
 
 /// Traces the photons that the options name and sums what they leave.
+/// @param weights     for weighsByTheEye: those of an earlier trace of the same smoke, lattice and
+///                    view; nothing = they are made
 /// @param checkpoint  goes on from its part `light` and keeps that while tracing; nullptr = no
 /// @param part        tells parts of one checkpoint apart: only light of the same part is gone on
 ///                    from
@@ -37,8 +41,9 @@ LightSums traceLightSums(const transport::Medium& medium, const transport::Light
                          const LightFieldLayout& layout, const View& view,
                          const std::vector<Vec3f>& particles,
                          const transport::TraceOptions& options,
-                         transport::TraceStatistics& statistics, Checkpoint* checkpoint = nullptr,
-                         std::uint64_t part = 0);
+                         transport::TraceStatistics& statistics,
+                         std::shared_ptr<const std::vector<float>> weights = {},
+                         Checkpoint* checkpoint = nullptr, std::uint64_t part = 0);
 
 /// Adds the sums of other photons of the same frame. @throws Error when a sum leaves 63 bits
 void addSums(LightSums& into, const LightSums& other);
