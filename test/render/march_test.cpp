@@ -144,6 +144,25 @@ TEST(Shadows, GridsAreForSmokeOfFewDepthsAVoxel) {
   EXPECT_GT(bytes([](const Vec3d& p) { return glm::length(p) < 0.15 ? 20.0 : 0.3; }), 0u);
 }
 
+// Between the nodes of so few the slope of the depth at the faces would be lost.
+TEST(Shadows, SmokeOfFewVoxelsHasNoGrid) {
+  const double sigma = 1.5;
+  transport::LightList lights;
+  lights.push_back(makeLight("directional", {{"position", "[0, 0, 1]"}, {"target", "[0, 0, 0]"}}));
+  const transport::Medium small = makeMedium(boxVolume(Vec3d(1.0), Vec3i(8), {0.8, 0.0, sigma}));
+  const render::Shadows shadows(small, lights, ShadowMode::grid, 0.125f, 0);
+  EXPECT_EQ(shadows.memoryBytes(), 0u);
+  transport::TrackingCounters counters;
+  Rng rng(RandomKey::fromSeed(1, 0), RandomStream::camera, 0);
+  for (const float z : {0.44f, 0.3f, 0.0f, -0.46f})
+    EXPECT_NEAR(static_cast<double>(shadows.transmittance(0, {0.4f, -0.2f, z}, {0, 0, -1.0f},
+                                                          kInfinity, rng, counters)),
+                std::exp(-sigma * (0.5 - static_cast<double>(z))), 0.004)
+        << z;
+  const transport::Medium larger = makeMedium(boxVolume(Vec3d(1.0), Vec3i(16), {0.8, 0.0, sigma}));
+  EXPECT_GT(render::Shadows(larger, lights, ShadowMode::grid, 0.0625f, 0).memoryBytes(), 0u);
+}
+
 TEST(March, TransmittanceDoesNotDependOnTheStep) {
   const transport::Medium medium = makeMedium(boxVolume(Vec3d(2.0), Vec3i(16), {0.8, 0.0, 1.5}));
   const transport::LightList lights;
