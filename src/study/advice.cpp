@@ -13,9 +13,12 @@ namespace photosphere::study {
 
 namespace {
 
+bool isPaths(const std::string& family) {
+  return family == "path_traced" || family == "light_traced";
+}
+
 bool isPhotosphere(const std::string& family) {
-  return family != "path_traced" && family != "light_traced" && family != "single" &&
-         family.rfind("photon_map", 0) != 0;
+  return !isPaths(family) && family != "single" && family.rfind("photon_map", 0) != 0;
 }
 
 struct Best {
@@ -127,9 +130,9 @@ void addHardCases(const StudyResult& result, std::vector<std::string>& out) {
       const Verdict v = verdictOf(sweep, layer);
       if (!v.known) continue;
       std::string path;
-      if (v.pathSeconds > 0)
-        path = fmt::format(" Path tracing would have the photosphere's error after about {}.",
-                           time(v.pathSeconds));
+      if (v.paths.seconds > 0)
+        path = fmt::format(" Paths would have the photosphere's error after about {} ({}).",
+                           time(v.paths.seconds), v.paths.title);
       out.push_back(
           fmt::format("{} ({}), layer {}: at {} the photosphere {}: {} with {}, {} with {}.{}",
                       sweep.name, sweep.description, kLayers[layer], time(v.seconds),
@@ -221,17 +224,20 @@ Verdict verdictOf(const SweepResult& sweep, std::size_t layer) {
   verdict.ourError = ours.error;
   verdict.rivalError = rival.error;
   verdict.known = true;
-  verdict.pathSeconds = pathSecondsFor(curves, ours.error);
+  verdict.paths = pathTimeFor(curves, ours.error);
   return verdict;
 }
 
-double pathSecondsFor(const std::vector<Curve>& curves, double error) {
-  for (const Curve& curve : curves)
-    if (curve.family == "path_traced" && error > 0) {
-      const CurvePoint& last = curve.points.back();
-      return last.seconds * std::pow(last.error / error, 2);
-    }
-  return 0;
+PathTime pathTimeFor(const std::vector<Curve>& curves, double error) {
+  PathTime best;
+  if (!(error > 0)) return best;
+  for (const Curve& curve : curves) {
+    if (!isPaths(curve.family)) continue;
+    const CurvePoint& last = curve.points.back();
+    const double seconds = last.seconds * std::pow(last.error / error, 2);
+    if (best.title.empty() || seconds < best.seconds) best = {curve.title, seconds};
+  }
+  return best;
 }
 
 bool isCacheable(const PointResult& point) {

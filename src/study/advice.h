@@ -15,19 +15,24 @@ std::vector<std::string> advice(const StudyResult& result);
 /// Whether a light cache can hold what the contender stores.
 bool isCacheable(const PointResult& point);
 
+/// Path tracing or light tracing, whichever has an error sooner.
+struct PathTime {
+  std::string title;   ///< empty where neither was measured
+  double seconds = 0;  ///< 0 the same
+};
+/// Until paths have this relative error, their squared error falling as 1 / time from their last
+/// point.
+PathTime pathTimeFor(const std::vector<Curve>& curves, double error);
+
 /// How the photosphere fares in one sweep against what is not a photosphere.
 struct Verdict {
   double seconds = 0;       ///< at which both are compared
   std::string ours, rival;  ///< titles of the best of each
   double ourError = 0, rivalError = 0;
-  double pathSeconds = 0;  ///< until path tracing has our error; pathSecondsFor
-  bool known = false;      ///< false where there is nothing to compare
+  PathTime paths;      ///< until paths have our error
+  bool known = false;  ///< false where there is nothing to compare
 };
 /// Compared at the time of the slowest photosphere point of the sweep, over all pixels.
 Verdict verdictOf(const SweepResult& sweep, std::size_t layer);
-
-/// Until path tracing has this relative error [s], its squared error falling as 1 / time from its
-/// last point; 0 where it was not measured.
-double pathSecondsFor(const std::vector<Curve>& curves, double error);
 
 }  // namespace photosphere::study

@@ -26,7 +26,7 @@ struct ErrorEstimate {
 /// whole batches with photons of their own tell it.
 ///
 /// A bias is told in two parts that add up. Means over square blocks of pixels are held against
-/// those of unbiased frames, so that any cause of a bias counts, known or not: path tracing is
+/// those of unbiased frames, so that any cause of a bias counts, known or not: paths are
 /// noisy pixel by pixel and far less so block by block. What stays within a block is told by a
 /// wider kernel. The blocks are the smallest that the unbiased frames at hand tell anything about.
 class FrameError {

@@ -81,8 +81,8 @@ struct ReferenceNote {
   std::uint64_t samplesBefore = 0, samples = 0;  ///< a pixel, as found and in all
   double seconds = 0;                            ///< spent on it in this run
   std::array<double, 2> noise{};                 ///< relMSE of its own noise, [layer], all pixels
-  /// The same from the spread of contenders of the reference's own method, whose weights do not depend on the
-  /// reference's outliers; 0 where there are none.
+  /// The same from the spread of contenders of the reference's own method, whose weights do not
+  /// depend on the reference's outliers; 0 where there are none.
   std::array<double, 2> pathNoise{};
   bool targetReached = false;  ///< noise at most a tenth of the best contender's relMSE
 };
