@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 
 #include "layer_renderer.h"
 #include "pass_light.h"
@@ -110,11 +111,11 @@ class FrameLoop {
     const Stopwatch watch;
     if (!m_renderer) m_renderer.emplace(m_scene, m_crop, m_setup);
     std::vector<Rgb> multiple;
-    double traced = m_result.statistics.seconds.trace;
+    const double tracedBefore = m_result.statistics.seconds.trace;
     if (m_setup.lightPaths)
       multiple = m_renderer->lightPaths(m_request.checkpoint, static_cast<std::uint64_t>(m_batches),
                                         m_result.statistics);
-    traced = m_result.statistics.seconds.trace - traced;
+    const double traced = m_result.statistics.seconds.trace - tracedBefore;
     StateReader* begun = m_film ? &*m_film : nullptr;
     render::FrameLayers layers = m_renderer->render(light.source.get(), m_pass, begun, filmPause());
     m_film.reset();
@@ -135,11 +136,10 @@ class FrameLoop {
   void renderTruth() {
     const Stopwatch watch;
     if (!m_renderer) m_renderer.emplace(m_scene, m_crop, m_setup);
-    if (!m_fromLamps) {
-      beginTruths();
-    } else {
+    if (m_fromLamps)
       m_error.addTruth(truth(m_error.truths(), *m_fromLamps));
-    }
+    else
+      beginTruths();
     m_result.statistics.seconds.check += watch.seconds();
     offer();
   }
@@ -147,47 +147,26 @@ class FrameLoop {
   // Two truths by paths from the eye, or two from the lamps where those are far quieter. Not by
   // what they take: the choice is a matter of bits, not of the clock.
   void beginTruths() {
-    const std::vector<Rgb> eye[] = {truth(0, false), truth(1, false)};
+    const auto two = [&](bool fromLamps) {
+      return std::array{truth(0, fromLamps), truth(1, fromLamps)};
+    };
+    const auto noise = [&](const auto& frames) {
+      return blockDifference(frames[0], frames[1], m_crop.max.x - m_crop.min.x);
+    };
+    auto truths = two(false);
     m_fromLamps = false;
-    if (!m_setup.medium->isMoving() && !m_setup.motion) {
-      const std::vector<Rgb> lamps[] = {truth(0, true), truth(1, true)};
-      m_fromLamps = blockNoise(lamps[0], lamps[1]) < kFarQuieter * blockNoise(eye[0], eye[1]);
-      if (*m_fromLamps)
-        for (const std::vector<Rgb>& frame : lamps)
-          m_error.addTruth(frame);
-    }
-    if (!*m_fromLamps)
-      for (const std::vector<Rgb>& frame : eye)
-        m_error.addTruth(frame);
+    if (!m_setup.medium->isMoving() && !m_setup.motion)
+      if (auto lamps = two(true); noise(lamps) < kFarQuieter * noise(truths)) {
+        m_fromLamps = true;
+        truths = std::move(lamps);
+      }
+    for (const std::vector<Rgb>& frame : truths)
+      m_error.addTruth(frame);
   }
 
   // Of another seed than the batches': its bits turned over.
   std::vector<Rgb> truth(int index, bool fromLamps) const {
     return m_renderer->truth(RandomKey::fromSeed(~seed(), index), fromLamps);
-  }
-
-  // How far two frames differ in the means of blocks, beside these and the frame's own mean.
-  double blockNoise(const std::vector<Rgb>& a, const std::vector<Rgb>& b) const {
-    constexpr int kEdge = 8;
-    const int width = m_crop.max.x - m_crop.min.x, columns = (width + kEdge - 1) / kEdge;
-    std::vector<Vec2d> blocks(a.size() / static_cast<std::size_t>(width) / kEdge *
-                                  static_cast<std::size_t>(columns) +
-                              static_cast<std::size_t>(columns));
-    Vec2d all(0.0);
-    for (std::size_t i = 0; i < a.size(); ++i) {
-      const std::size_t x = i % static_cast<std::size_t>(width),
-                        y = i / static_cast<std::size_t>(width);
-      const Vec2d both(static_cast<double>(meanComponent(a[i])),
-                       static_cast<double>(meanComponent(b[i])));
-      blocks[y / kEdge * static_cast<std::size_t>(columns) + x / kEdge] += both;
-      all += both / static_cast<double>(blocks.size());
-    }
-    double sum = 0;
-    for (const Vec2d& block : blocks) {
-      const double scale = block.x + block.y + all.x + all.y;
-      if (scale > 0) sum += (block.x - block.y) * (block.x - block.y) / (scale * scale);
-    }
-    return sum;
   }
 
   // Between parts. A frame of one part is done when that is, and needs keeping no more.

@@ -67,6 +67,23 @@ std::size_t blockOf(std::size_t i, int width, int columns, std::size_t level) {
 
 }  // namespace
 
+double blockDifference(std::vector<Rgb> a, std::vector<Rgb> b, int width) {
+  constexpr int kHalvings = 3;
+  for (int i = 0; i < kHalvings; ++i, width = (width + 1) / 2) {
+    a = halved(a, width);
+    b = halved(b, width);
+  }
+  double mean = 0;
+  for (std::size_t i = 0; i < a.size(); ++i)
+    mean += static_cast<double>(meanComponent(a[i] + b[i])) / static_cast<double>(a.size());
+  double sum = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const double scale = static_cast<double>(meanComponent(a[i] + b[i])) + mean;
+    if (scale > 0) sum += square(static_cast<double>(meanComponent(a[i] - b[i])) / scale);
+  }
+  return sum;
+}
+
 double ErrorEstimate::total() const {
   return std::sqrt(noise * noise + bias * bias);
 }

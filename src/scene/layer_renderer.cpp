@@ -148,14 +148,12 @@ std::vector<Rgb> LayerRenderer::truth(RandomKey key, bool fromLamps) const {
   options.samples = static_cast<int>(std::clamp<std::int64_t>(kTruthPaths / pixels, 1, 64));
   options.key = key;
   render::PathOptions path = m_path;
-  path.effects.multipleScattering = !fromLamps;
+  if (fromLamps) path.effects.multipleScattering = false;
   const auto integrator = render::makePathIntegrator(*m_setup.medium, m_setup.lights, path);
   render::FrameLayers layers = render::renderFrame(*m_setup.camera, *integrator, options);
   if (fromLamps) {
     render::LightPathOptions paths;
-    const Vec2i frame = m_setup.camera->resolution();
-    paths.photons = static_cast<std::uint64_t>(options.samples) *
-                    static_cast<std::uint64_t>(frame.x) * static_cast<std::uint64_t>(frame.y);
+    paths.photons = static_cast<std::uint64_t>(options.samples * pixels);
     paths.key = key;
     transport::TraceStatistics traced;
     render::setMultiple(layers, lightPaths(paths, traced));

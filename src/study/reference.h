@@ -47,9 +47,9 @@ std::optional<ReferenceImage> readReference(const std::filesystem::path& path,
 
 /// Noise of two young references of one picture by different methods, which their own variances
 /// tell in part: rare bright paths that a method has not yet met leave its pixels dark and their
-/// variance small. Where the two differ by more than their variances explain, the darker one is
-/// taken to have missed that. Mean over pixels, channels and both layers of the squared error, over
-/// the square of their mean there and over the frame.
+/// variance small. Where the means of 8 x 8 pixels differ by more than their variances explain, the
+/// darker one is taken to have missed that. Mean over pixels, channels and both layers of the
+/// squared error, over the square of both means' mean there and over the frame.
 std::array<double, 2> roughNoise(const ReferenceImage& a, const ReferenceImage& b);
 
 /// Grows the reference of one scene and frame, by paths from the eye or from the lamps: whichever

@@ -22,6 +22,11 @@ struct ErrorEstimate {
   double bound() const;
 };
 
+/// How far two frames differ in the means of 8 x 8 pixels, as a relative squared difference of
+/// these beside the frame's own mean, summed over blocks.
+/// @param width  of both [pixels]
+double blockDifference(std::vector<Rgb> a, std::vector<Rgb> b, int width);
+
 /// Adds up batches of one frame. Photon noise is shared by neighbouring pixels and samples, so only
 /// whole batches with photons of their own tell it.
 ///
