@@ -18,20 +18,20 @@ endif()
 find_package(OpenVDB 10.0 REQUIRED COMPONENTS openvdb)
 
 find_package(OpenEXR 3.1 REQUIRED)
-find_package(OpenImageIO 2.4 REQUIRED)
 
 # Debian puts OpenColorIOConfig.cmake straight into /usr/share/cmake, where find_package does not look.
 find_package(OpenColorIO 2.1 REQUIRED PATHS /usr/share/cmake)
 
 # Two of Debian's targets name include folders that are not there, at which CMake stops: OpenImageIO
 # that of OpenCV, which its package does not require, and OpenColorIO the folder /include.
-foreach(target IN ITEMS OpenImageIO::OpenImageIO OpenColorIO::OpenColorIO)
-  get_target_property(PHOTOSPHERE_INCLUDES ${target} INTERFACE_INCLUDE_DIRECTORIES)
-  set(PHOTOSPHERE_PRESENT "")
-  foreach(folder IN LISTS PHOTOSPHERE_INCLUDES)
+function(photosphere_drop_absent_includes target)
+  get_target_property(includes ${target} INTERFACE_INCLUDE_DIRECTORIES)
+  set(present "")
+  foreach(folder IN LISTS includes)
     if(IS_DIRECTORY "${folder}" OR folder MATCHES "^[$]<")
-      list(APPEND PHOTOSPHERE_PRESENT "${folder}")
+      list(APPEND present "${folder}")
     endif()
   endforeach()
-  set_target_properties(${target} PROPERTIES INTERFACE_INCLUDE_DIRECTORIES "${PHOTOSPHERE_PRESENT}")
-endforeach()
+  set_target_properties(${target} PROPERTIES INTERFACE_INCLUDE_DIRECTORIES "${present}")
+endfunction()
+photosphere_drop_absent_includes(OpenColorIO::OpenColorIO)

@@ -4,6 +4,8 @@ set(package_dir "${CMAKE_INSTALL_LIBDIR}/cmake/photosphere")
 
 install(TARGETS photosphere EXPORT photosphereTargets
   ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}")
+get_property(loaded GLOBAL PROPERTY PHOTOSPHERE_LOADED)
+install(TARGETS ${loaded} LIBRARY DESTINATION "${CMAKE_INSTALL_LIBDIR}/photosphere")
 install(TARGETS photosphere_app RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}")
 install(DIRECTORY "${PROJECT_SOURCE_DIR}/include/photosphere"
   DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}" FILES_MATCHING PATTERN "*.h")

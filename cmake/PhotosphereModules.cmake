@@ -5,11 +5,15 @@
 # modules that this one may include. It is recorded for the layer test, which reads the includes.
 define_property(GLOBAL PROPERTY PHOTOSPHERE_MODULES BRIEF_DOCS "Module names, lowest first")
 define_property(GLOBAL PROPERTY PHOTOSPHERE_MODULE_TABLE BRIEF_DOCS "module: used modules")
+define_property(GLOBAL PROPERTY PHOTOSPHERE_LOADED BRIEF_DOCS "Libraries loaded when needed")
+set(PHOTOSPHERE_LOADED_DIR "${PROJECT_BINARY_DIR}/lib/photosphere")
+list(APPEND CMAKE_BUILD_RPATH "${PHOTOSPHERE_LOADED_DIR}")
 
 function(photosphere_module)
   cmake_parse_arguments(PARSE_ARGV 0 arg "" "NAME" "USES;LIBRARIES;SOURCES")
   set(target photosphere_${arg_NAME})
   file(GLOB_RECURSE sources CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/*.cpp")
+  list(FILTER sources EXCLUDE REGEX "/loaded/")
   if(NOT sources AND NOT arg_SOURCES)
     return()
   endif()
@@ -25,6 +29,22 @@ function(photosphere_module)
   set_property(GLOBAL APPEND PROPERTY PHOTOSPHERE_MODULES ${arg_NAME})
   string(JOIN " " uses ${arg_USES})
   set_property(GLOBAL APPEND PROPERTY PHOTOSPHERE_MODULE_TABLE "${arg_NAME}: ${uses}")
+endfunction()
+
+# photosphere_loaded(NAME name LIBRARIES target...)
+#
+# Declares photosphere_<name>.so from loaded/<name>.cpp of the calling folder, which takes no part in the
+# module: it links libraries that most runs do not need, and is loaded by name when it is. Programs of
+# this build find it by CMAKE_BUILD_RPATH, others by what PhotosphereInstall.cmake sets.
+function(photosphere_loaded)
+  cmake_parse_arguments(PARSE_ARGV 0 arg "" "NAME" "LIBRARIES")
+  set(target photosphere_${arg_NAME})
+  add_library(${target} MODULE "loaded/${arg_NAME}.cpp")
+  set_target_properties(${target} PROPERTIES PREFIX ""
+    LIBRARY_OUTPUT_DIRECTORY "${PHOTOSPHERE_LOADED_DIR}")
+  target_include_directories(${target} PRIVATE "${CMAKE_CURRENT_SOURCE_DIR}")
+  target_link_libraries(${target} PRIVATE photosphere_settings ${arg_LIBRARIES})
+  set_property(GLOBAL APPEND PROPERTY PHOTOSPHERE_LOADED ${target})
 endfunction()
 
 # photosphere_plugins(MODULE module TYPE type FUNCTION function HEADER header PLUGINS stem...)

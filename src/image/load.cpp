@@ -1,10 +1,10 @@
 #include "photosphere/image/load.h"
 
-#include <OpenImageIO/imageio.h>
 #include <fmt/format.h>
 
 #include <fstream>
 
+#include "openimageio.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/resources.h"
 #include "photosphere/image/exr.h"
@@ -47,31 +47,30 @@ LoadedImage fromExr(const std::string& name) {
   return loaded;
 }
 
-void checkSpec(const std::string& name, const OIIO::ImageSpec& spec, std::uint64_t fileSize) {
-  if (spec.width < 1 || spec.height < 1 || spec.nchannels < 1 || spec.depth > 1)
+void checkHeader(const std::string& name, const PictureHeader& header, std::uint64_t fileSize) {
+  if (header.width < 1 || header.height < 1 || header.channels < 1 || header.depth > 1)
     throw InputError(name, "holds no flat picture");
   const auto pixels =
-      static_cast<std::uint64_t>(spec.width) * static_cast<std::uint64_t>(spec.height);
-  if (pixels * spec.pixel_bytes(true) / kLargestRatio > fileSize)
+      static_cast<std::uint64_t>(header.width) * static_cast<std::uint64_t>(header.height);
+  if (pixels * header.bytesPerPixel / kLargestRatio > fileSize)
     throw InputError(name, fmt::format("claims {}x{} pixels, more than {} bytes can hold",
-                                       spec.width, spec.height, fileSize));
-  const std::uint64_t needed = pixels * 4 * (static_cast<std::uint64_t>(spec.nchannels) + 3);
+                                       header.width, header.height, fileSize));
+  const std::uint64_t needed = pixels * 4 * (static_cast<std::uint64_t>(header.channels) + 3);
   if (needed > availableMemoryBytes())
     throw MemoryError(fmt::format("{}: its pixels need {}, but {} of memory are free", name,
                                   formatBytes(needed), formatBytes(availableMemoryBytes())));
 }
 
 LoadedImage fromOther(const std::string& name, std::uint64_t fileSize) {
-  const auto input = OIIO::ImageInput::open(name);
-  if (!input) throw InputError(name, "is not a picture that can be read: " + OIIO::geterror());
-  const OIIO::ImageSpec& spec = input->spec();
-  checkSpec(name, spec, fileSize);
-  const auto channels = static_cast<std::size_t>(spec.nchannels);
-  std::vector<float> pixels(static_cast<std::size_t>(spec.image_pixels()) * channels);
-  if (!input->read_image(0, 0, 0, spec.nchannels, OIIO::TypeDesc::FLOAT, pixels.data()))
-    throw InputError(name, "is damaged: " + input->geterror());
+  PictureHeader header;
+  std::vector<float> pixels;
+  const std::string wrong = openImageIo().read(
+      name, [&](const PictureHeader& found) { checkHeader(name, found, fileSize); }, header,
+      pixels);
+  if (!wrong.empty()) throw InputError(name, wrong);
 
-  LoadedImage loaded{Image(spec.width, spec.height), spec.get_string_attribute("oiio:ColorSpace")};
+  const auto channels = static_cast<std::size_t>(header.channels);
+  LoadedImage loaded{Image(header.width, header.height), header.colorSpace};
   for (std::size_t c = 0; c < 3; ++c) {
     const std::span<float> plane = loaded.image.addChannel(std::string(1, "RGB"[c]));
     const std::size_t source = channels >= 3 ? c : 0;  // grey, or grey and alpha

@@ -1,13 +1,12 @@
 #include "photosphere/image/preview.h"
 
-#include <OpenImageIO/filesystem.h>
-#include <OpenImageIO/imageio.h>
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cctype>
 #include <cmath>
 
+#include "openimageio.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/output_file.h"
 #include "photosphere/core/parallel.h"
@@ -57,21 +56,12 @@ std::vector<float> displayPixels(const Image& image, const ColorConfig& config,
 
 std::string encode(const std::string& path, const std::string& format, const Window& window,
                    std::span<const float> pixels, const DisplayOptions& options) {
-  const auto failed = [&](const std::string& why) {
-    return OutputError(path, "cannot encode this preview: " + why);
-  };
-  // To memory: this library's writers report a full disk late or never.
-  OIIO::Filesystem::IOVecOutput memory;
-  const auto output = OIIO::ImageOutput::create(format, &memory);
-  if (!output) throw failed(OIIO::geterror());
-  OIIO::ImageSpec spec(window.width, window.height, 3, OIIO::TypeDesc::UINT8);
-  if (options.dither) spec.attribute("oiio:dither", 1);
-  if (format == "jpeg") spec.attribute("Compression", fmt::format("jpeg:{}", options.jpegQuality));
-  if (!output->open(path, spec) || !output->write_image(OIIO::TypeDesc::FLOAT, pixels.data()) ||
-      !output->close())
-    throw failed(output->geterror());
-  const std::vector<unsigned char>& bytes = memory.buffer();
-  return {bytes.begin(), bytes.end()};
+  PictureEncoding encoding{format.c_str(), window.width, window.height, options.dither, {}};
+  if (format == "jpeg") encoding.compression = fmt::format("jpeg:{}", options.jpegQuality);
+  std::string bytes;
+  const std::string wrong = openImageIo().encode(encoding, pixels.data(), bytes);
+  if (!wrong.empty()) throw OutputError(path, "cannot encode this preview: " + wrong);
+  return bytes;
 }
 
 }  // namespace
@@ -92,6 +82,7 @@ std::string encodePng(int width, int height, std::span<const float> rgb) {
 void checkPreview(const std::filesystem::path& path, const ColorConfig& config,
                   const DisplayOptions& options) {
   formatOf(path);
+  openImageIo();
   config.displayConverter(options.renderingSpace, options.display, options.view);
 }
 

@@ -37,6 +37,15 @@ set(config "${prefix}/share/photosphere/color/config.ocio")
 set(render "${prefix}/bin/photosphere" render "${SOURCE}/data/caches/column_0020.vdb"
   -o "${WORK}/a.exr" --preview "${WORK}/a.png" --res 32x18 -s estimator.type=single -q)
 run(${render})
+
+# What it loads for pictures is the library beside it; without that it says so before the work.
+file(RENAME "${prefix}/lib/photosphere" "${prefix}/lib/hidden")
+execute_process(COMMAND ${render} RESULT_VARIABLE result ERROR_VARIABLE text OUTPUT_QUIET)
+if(NOT result EQUAL 1 OR NOT text MATCHES "photosphere_openimageio.so.*install photosphere whole")
+  message(FATAL_ERROR "a library that is not there: exit ${result}\n${text}")
+endif()
+file(RENAME "${prefix}/lib/hidden" "${prefix}/lib/photosphere")
+
 file(WRITE "${config}" "not a config\n")
 execute_process(COMMAND ${render} RESULT_VARIABLE result ERROR_VARIABLE text OUTPUT_QUIET)
 if(result EQUAL 0 OR NOT text MATCHES "prefix/share/photosphere/color/config.ocio")
