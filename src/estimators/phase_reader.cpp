@@ -1,8 +1,31 @@
 #include "phase_reader.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace photosphere::estimators {
+
+namespace {
+
+// The least value of a phase function over its mean. Cut at an order it may dip that far below
+// zero: the narrower a lobe, the darker it is beside it, and the more a dip there would take away.
+// Error of light scattered more than once in the column, order 8 and 4, against no more than 0.1,
+// 0.05, 0.02: g = 0.7 (0.10) 0.060, 0.060, 0.058 and 0.059, 0.060, 0.061; g = 0.85 (0.044) 0.110,
+// 0.108, 0.109 and 0.19, 0.20, 0.22; g = 0.95 (0.013) 0.30, 0.27, 0.26 and 0.68, 0.73, 0.86, where
+// uncut it is 3.0 and 5.0.
+double leastShare(const phase::PhaseFunction& function) {
+  constexpr int kAngles = 90;
+  double least = std::numeric_limits<double>::infinity();
+  for (int i = 0; i <= kAngles; ++i) {
+    const double angle = kPi * i / kAngles;
+    const Vec3f w(Vec3d(std::sin(angle), 0, std::cos(angle)));
+    least = std::min(least, static_cast<double>(function.evaluate(w, Vec3f(0, 0, 1))));
+  }
+  return 4 * kPi * least;
+}
+
+}  // namespace
 
 PhaseReader::PhaseReader(const LightFieldLayout& layout, const transport::Medium& medium, int phase)
     : m_layout(layout), m_medium(medium), m_phase(phase) {
@@ -26,11 +49,12 @@ PhaseReader::PhaseReader(const LightFieldLayout& layout, const transport::Medium
         sphere::convolved(moments, sphere::kernelMoments(layout.directionKernel(), moments.size()));
   if (layout.basis == Basis::sphericalHarmonics) {
     // Convolving with a function of the angle scales degree l by its moment (Funk & Hecke): exact
-    // up to the order, at the moments' own length zero.
+    // up to the order.
     m_harmonics.emplace(layout.order);
+    moments = sphere::cutAt(moments, layout.order, leastShare(function));
     for (int i = 0; i < m_harmonics->count(); ++i) {
       const auto l = static_cast<std::size_t>(sphere::SphericalHarmonics::degree(i));
-      m_moments.push_back(l < moments.size() ? static_cast<float>(moments[l]) : 0.0f);
+      m_moments.push_back(static_cast<float>(moments[l]));
     }
     return;
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "photosphere/core/parallel.h"
 
@@ -64,6 +65,48 @@ LegendreMoments convolved(const LegendreMoments& a, const LegendreMoments& b) {
   for (std::size_t l = 0; l < product.size(); ++l)
     product[l] = a[l] * b[l];
   return product;
+}
+
+namespace {
+
+// Least value over its mean of the function that has these moments alone.
+double leastValue(const LegendreMoments& moments) {
+  const int angles = 32 * static_cast<int>(moments.size());
+  double least = std::numeric_limits<double>::infinity();
+  for (int i = 0; i <= angles; ++i) {
+    const double c = std::cos(kPi * i / angles);
+    double previous = 1, current = c, sum = moments[0];
+    for (std::size_t l = 1; l < moments.size(); ++l) {
+      const auto n = static_cast<double>(l);
+      sum += (2 * n + 1) * moments[l] * current;
+      const double next = ((2 * n + 1) * c * current - n * previous) / (n + 1);
+      previous = current;
+      current = next;
+    }
+    least = std::min(least, sum);
+  }
+  return least / moments[0];
+}
+
+}  // namespace
+
+LegendreMoments cutAt(const LegendreMoments& moments, int order, double dip) {
+  LegendreMoments cut = moments;
+  cut.resize(static_cast<std::size_t>(order) + 1, 0.0);
+  const auto spread = [&cut](double time) {
+    LegendreMoments out = cut;
+    for (std::size_t l = 0; l < out.size(); ++l)
+      out[l] *= std::exp(-time * static_cast<double>(l * (l + 1)));
+    return out;
+  };
+  if (leastValue(cut) >= -dip) return cut;
+  // After a time of 1 degree 1 is left with an eighth, and nothing dips.
+  double early = 0, late = 1;
+  for (int i = 0; i < 20; ++i) {
+    const double time = 0.5 * (early + late);
+    (leastValue(spread(time)) >= -dip ? late : early) = time;
+  }
+  return spread(late);
 }
 
 ZonalTable::ZonalTable(const LegendreMoments& moments) {

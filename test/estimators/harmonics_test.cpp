@@ -87,14 +87,13 @@ AngularError judge(double g, const LightFieldLayout& layout, int samples = 4, in
 }
 
 TEST(Harmonics, ErrorFallsWithTheOrder) {
-  // Bounds are about twice what was measured. The lamp is off to the side, where a series cut at
-  // order 2 nearly cancels at g = 0.7.
+  // Bounds are about twice what was measured.
   const struct {
     double g;
     int order;
     double mean, l2;
-  } rows[] = {{0.4, 0, 0.3, 0.4}, {0.4, 2, 0.03, 0.03}, {0.4, 4, 0.003, 0.005},
-              {0.7, 2, 0.4, 0.4}, {0.7, 4, 0.1, 0.1},   {0.7, 8, 0.01, 0.02}};
+  } rows[] = {{0.4, 0, 0.3, 0.4},  {0.4, 2, 0.03, 0.03}, {0.4, 4, 0.003, 0.005},
+              {0.7, 2, 0.05, 0.1}, {0.7, 4, 0.1, 0.1},   {0.7, 8, 0.01, 0.02}};
   std::map<std::pair<double, int>, AngularError> found;
   for (const auto& row : rows) {
     const AngularError e = judge(row.g, layoutOf(Basis::sphericalHarmonics, row.order));
@@ -107,11 +106,23 @@ TEST(Harmonics, ErrorFallsWithTheOrder) {
   const auto l2 = [&](double g, int order) { return found[{g, order}].l2; };
   EXPECT_LT(l2(0.4, 2), 0.3 * l2(0.4, 0));
   EXPECT_LT(l2(0.4, 4), 0.3 * l2(0.4, 2));
-  EXPECT_LT(l2(0.7, 4), 0.5 * l2(0.7, 2));
+  EXPECT_LT(l2(0.7, 4), l2(0.7, 2));
   EXPECT_LT(l2(0.7, 8), 0.5 * l2(0.7, 4));
-  // What a cut series puts below zero is said, and less of it the longer the series.
-  EXPECT_GT((found[{0.7, 2}]).clamped, 0.005);
-  EXPECT_LT((found[{0.7, 8}]).clamped, 0.002);
+  // A series that is cut as it may be puts hardly anything below zero (0.2 dark in order 2 at 0.7,
+  // where it was cut as it is).
+  for (const auto& [key, e] : found)
+    EXPECT_LT(e.clamped, 0.001) << key.first << ' ' << key.second;
+}
+
+// A lobe far narrower than the order: cut as it is it rings to several times the light (mean 5.3 at
+// order 8 in the column at g = 0.95).
+TEST(Harmonics, DoNotRingWhereALobeIsNarrow) {
+  for (const double g : {0.9, 0.97}) {
+    const AngularError e = judge(g, layoutOf(Basis::sphericalHarmonics, 8));
+    if (kSanitized) continue;
+    EXPECT_NEAR(e.mean, 1.0, 0.3) << g;
+    EXPECT_LT(e.clamped, 0.05) << g;
+  }
 }
 
 // The truth itself is noisy at this length: bounds are those of its noise.

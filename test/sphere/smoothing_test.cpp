@@ -214,5 +214,44 @@ TEST(Lobes, ConvolveToHenyeyGreenstein) {
   }
 }
 
+// Value over its mean of a series, at a cosine.
+double valueOf(const LegendreMoments& moments, double c) {
+  double sum = 0;
+  for (std::size_t l = 0; l < moments.size(); ++l)
+    sum += static_cast<double>(2 * l + 1) * moments[l] * std::legendre(static_cast<unsigned>(l), c);
+  return sum;
+}
+
+TEST(CutSeries, DipsNoDeeperThanItMay) {
+  for (const double g : {0.7, -0.85, 0.95, 0.9999})
+    for (const int order : {1, 2, 4, 8})
+      for (const double dip : {0.0, 0.1, 0.5}) {
+        const LegendreMoments cut = cutAt(momentsOf(g), order, dip);
+        ASSERT_EQ(cut.size(), static_cast<std::size_t>(order) + 1);
+        EXPECT_EQ(cut[0], 1.0);
+        double least = 1;
+        for (int i = 0; i <= 2000; ++i)
+          least = std::min(least, valueOf(cut, std::cos(kPi * i / 2000)));
+        EXPECT_GE(least, -dip - 1e-3) << g << ' ' << order;
+        // No more than it takes.
+        if (cut[1] != g) {
+          EXPECT_NEAR(least, -dip, 1e-3) << g << ' ' << order;
+        }
+        // Diffusion: the logarithm of what is left of a degree is -t l (l + 1).
+        const double t = -std::log(cut[1] / g) / 2;
+        for (std::size_t l = 1; l < cut.size(); ++l)
+          EXPECT_NEAR(-std::log(cut[l] / std::pow(g, static_cast<double>(l))),
+                      t * static_cast<double>(l * (l + 1)), 1e-9);
+      }
+}
+
+TEST(CutSeries, IsAsItIsWhereItHardlyDips) {
+  for (const auto& [g, order] : {std::pair{0.0, 4}, {0.4, 2}, {0.7, 8}, {-0.5, 4}}) {
+    const LegendreMoments cut = cutAt(momentsOf(g), order, 0.1);
+    for (std::size_t l = 0; l < cut.size(); ++l)
+      EXPECT_NEAR(cut[l], l == 0 ? 1.0 : std::pow(g, static_cast<double>(l)), 1e-6) << g;
+  }
+}
+
 }  // namespace
 }  // namespace photosphere::sphere

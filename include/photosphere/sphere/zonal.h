@@ -17,6 +17,12 @@ using LegendreMoments = std::vector<double>;
 LegendreMoments kernelMoments(const SmoothingKernel& kernel, std::size_t count);
 /// Moments of the convolution of two functions.
 LegendreMoments convolved(const LegendreMoments& a, const LegendreMoments& b);
+/// Moments of degree 0 to `order` of a function that is none below zero, spread by diffusion over
+/// the sphere, f_l exp(-t l (l + 1)), for the least time t at which what is left of it dips below
+/// zero by no more than `dip` of its mean: cut where a narrow lobe still has much above the order,
+/// a series rings from pole to pole.
+/// @param dip  0 or more; one that is never reached leaves t = 0
+LegendreMoments cutAt(const LegendreMoments& moments, int order, double dip);
 
 /// A function of the angle between two unit directions as a table, from its moments; never
 /// negative. Immutable; thread-safe.
