@@ -13,6 +13,12 @@ namespace {
 
 using Field = volume::BrickField<Vec4f>;
 
+// How far below zero sharpening may leave a voxel, in parts of the light around it. With 0 there is
+// less noise, and what the blur takes away is not all given back: a million photons in the column
+// at g = 0.7 and 0.95 have relative errors of 0.063 and 0.38 and a mean of 0.984 and 0.951 with 0,
+// 0.061 and 0.41, 0.993 and 0.971 with 1; cut off at zero 0.060 and 0.43, 0.994 and 1.009.
+constexpr float kDebt = 1.0f;
+
 struct Tap {
   Vec3i offset;
   float weight;
@@ -78,6 +84,68 @@ Smoothed smoothVoxels(const SupportLattice& lattice, const Colours& colours, Spa
   return smoothed;
 }
 
+namespace {
+
+// What a blur takes from a voxel goes to its neighbours, one part to each. Adds what a blur of
+// `from` takes away to `to`, part by part, but no more of the parts that a voxel gives up than it
+// has and kDebt of its blur: none is lost and none made (Zalesak 1979, of transport), where cutting
+// off what falls below zero makes light of noise. @return the blur
+Colours addBlurred(const SupportLattice& lattice, const std::vector<Tap>& taps, const Colours& from,
+                   Colours& to) {
+  Colours blurred(from.size()), share(from.size());
+  parallelFor(from.size(), 512, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      Vec4f sum(0.0f), lost(0.0f);
+      float weight = 0.0f;
+      for (const Tap& tap : taps) {
+        const std::int32_t n = lattice.number(lattice.voxel(i) + tap.offset);
+        if (n < 0) continue;
+        const Vec4f& other = from[static_cast<std::size_t>(n)];
+        sum += tap.weight * other;
+        lost += tap.weight * glm::max(other - from[i], Vec4f(0.0f));
+        weight += tap.weight;
+      }
+      blurred[i] = sum / weight;  // at least this voxel itself
+      lost /= weight;
+      const Vec4f may = glm::max(to[i] + kDebt * blurred[i], Vec4f(0.0f));
+      for (int c = 0; c < 4; ++c)
+        share[i][c] = lost[c] > may[c] ? may[c] / lost[c] : 1.0f;
+    }
+  });
+  Colours out(from.size());
+  parallelFor(from.size(), 512, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      Vec4f sum(0.0f);
+      float weight = 0.0f;
+      for (const Tap& tap : taps) {
+        const std::int32_t n = lattice.number(lattice.voxel(i) + tap.offset);
+        if (n < 0) continue;
+        const Vec4f part = from[i] - from[static_cast<std::size_t>(n)];
+        const Vec4f& given = share[static_cast<std::size_t>(n)];
+        sum += tap.weight *
+               (glm::max(part, Vec4f(0.0f)) * given + glm::min(part, Vec4f(0.0f)) * share[i]);
+        weight += tap.weight;
+      }
+      out[i] = to[i] + sum / weight;
+    }
+  });
+  to = std::move(out);
+  return blurred;
+}
+
+}  // namespace
+
+Colours sharpenedVoxels(const SupportLattice& lattice, const Colours& colours, SpatialKernel kernel,
+                        double radius) {
+  const std::vector<Tap> taps = kernelTaps(kernel, radius / lattice.edge());
+  const bool widened = taps.size() > 1;
+  Colours sharp = widened ? convolve(lattice, colours, taps) : colours;
+  const Colours once = sharp;
+  const Colours again = widened ? addBlurred(lattice, taps, once, sharp) : once;
+  addBlurred(lattice, readingTaps(), again, sharp);
+  return sharp;
+}
+
 Colours sharpened(const Smoothed& smoothed) {
   Colours out(smoothed.once.size());
   for (std::size_t i = 0; i < out.size(); ++i)
@@ -129,7 +197,7 @@ Colours smoothWeighted(const SupportLattice& lattice, const Colours& colours,
 Colours smoothFluence(const transport::Medium& medium, const SupportLattice& lattice,
                       const Colours& colours, const LightFieldLayout& layout) {
   if (layout.smoothing == Smoothing::twicing)
-    return sharpened(smoothVoxels(lattice, colours, layout.kernel, layout.radius));
+    return sharpenedVoxels(lattice, colours, layout.kernel, layout.radius);
   const std::vector<Tap> taps = kernelTaps(layout.kernel, layout.radius / lattice.edge());
   Colours plain = convolve(lattice, colours, taps);
   if (layout.smoothing == Smoothing::plain) return plain;

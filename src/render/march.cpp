@@ -82,6 +82,9 @@ class MarchIntegrator final : public Integrator {
     } else if (ray.length > 0.0f) {
       transmittance = march(ray, when, nullptr, result, rng, counters);
     }
+    // Noise of stored light may leave less than none.
+    result.single = glm::max(result.single, Rgb(0.0f));
+    result.multiple = glm::max(result.multiple, Rgb(0.0f));
     result.transmittance = Rgb(transmittance);
     for (const auto& light : m_lights)
       result.background += transmittance * light->background(direction);

@@ -7,7 +7,9 @@
 #include "photosphere/core/error.h"
 #include "photosphere/estimators/layout_names.h"
 #include "support/frames.h"
+#include "support/media.h"
 #include "support/support.h"
+#include "voxel_smoothing.h"
 
 namespace photosphere::test {
 namespace {
@@ -38,6 +40,69 @@ TEST(FluenceSmoothing, DensityGainsWhatPlainLosesAndTheOthersAreBetween) {
               0.002);
   for (const Smoothing way : {Smoothing::plain, Smoothing::density, Smoothing::mean})
     EXPECT_LT(errors[Smoothing::twicing].relMse, errors[way].relMse);
+}
+
+// A few voxels with light, as few photons leave them: what sharpening takes from their neighbours
+// is what it gives to them.
+TEST(FluenceSmoothing, SharpeningMakesNoLightOfNoise) {
+  const transport::Medium medium =
+      makeMedium(sampledVolume(1.0, 32, {}, [](const Vec3d&) { return 1.0; }));
+  const transport::SupportLattice lattice(medium, medium.voxelEdge(), 1);
+  for (const double radius : {0.0, 2.5}) {
+    Colours colours(lattice.size(), Vec4f(0.0f));
+    Rng rng(RandomKey::fromSeed(7, 0), RandomStream::test, 0);
+    double before = 0;
+    for (std::size_t i = 0; i < colours.size(); ++i) {
+      if (rng.uniform() > 0.02f) continue;
+      const Vec3f p = lattice.center(i);
+      // Where all neighbours of neighbours are.
+      if (glm::max(std::abs(p.x), std::max(std::abs(p.y), std::abs(p.z))) > 0.3f) continue;
+      colours[i] = Vec4f(rng.uniform());
+      before += static_cast<double>(colours[i].x);
+    }
+    ASSERT_GT(before, 10);
+    const double edge = lattice.edge();
+    const Colours sharp =
+        sharpenedVoxels(lattice, colours, SpatialKernel::epanechnikov, radius * edge);
+    const Smoothed smoothed =
+        smoothVoxels(lattice, colours, SpatialKernel::epanechnikov, radius * edge);
+    double after = 0, cut = 0;
+    float brightest = 0;
+    for (std::size_t i = 0; i < sharp.size(); ++i) {
+      after += static_cast<double>(sharp[i].x);
+      cut += std::max(0.0, static_cast<double>(2 * smoothed.once[i].x - smoothed.again[i].x));
+      brightest = std::max(brightest, sharp[i].x / std::max(smoothed.once[i].x, 1e-6f));
+    }
+    EXPECT_NEAR(after / before, 1.0, 1e-4) << radius;
+    EXPECT_GT(brightest, 1.05f) << radius;    // it does sharpen
+    EXPECT_GT(cut / before, 1.05) << radius;  // where cutting off does make some
+  }
+}
+
+// Frames of few photons have the mean of one of many.
+TEST(FluenceSmoothing, FewPhotonsHaveTheMeanOfMany) {
+  const TestScene scene = sphereScene(2, 0.9, 0.7, 32, 24);
+  LightFieldLayout layout;
+  layout.channels = 1;
+  layout.lightVoxel = 0.5;
+  layout.radius = 1e-3;
+  const auto meanOf = [&](std::uint64_t photons, std::uint64_t seed) {
+    double sum = 0;
+    for (const Rgb& pixel : renderPhotosphere(scene, layout, photons, seed).layers.multiple)
+      sum += static_cast<double>(pixel.x);
+    return sum;
+  };
+  if (kSanitized) {
+    EXPECT_GT(meanOf(1000, 1), 0);
+    return;
+  }
+  double few = 0;
+  constexpr int kFrames = 48;
+  for (int i = 0; i < kFrames; ++i)
+    few += meanOf(20'000, 100 + static_cast<std::uint64_t>(i)) / kFrames;
+  const double many = meanOf(3'000'000, 5);
+  std::printf("  few over many %.4f\n", few / many);
+  EXPECT_NEAR(few / many, 1.0, 0.03);
 }
 
 // A voxel's mean says little of light that enters and leaves within a hundredth of it.
