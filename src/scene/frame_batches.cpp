@@ -153,13 +153,15 @@ class FrameLoop {
     const auto noise = [&](const auto& frames) {
       return blockDifference(frames[0], frames[1], m_crop.max.x - m_crop.min.x);
     };
+    // What is kept after a signal knows of no choice before both ends have been tried.
     auto truths = two(false);
-    m_fromLamps = false;
+    bool fromLamps = false;
     if (!m_setup.medium->isMoving() && !m_setup.motion)
       if (auto lamps = two(true); noise(lamps) < kFarQuieter * noise(truths)) {
-        m_fromLamps = true;
+        fromLamps = true;
         truths = std::move(lamps);
       }
+    m_fromLamps = fromLamps;
     for (const std::vector<Rgb>& frame : truths)
       m_error.addTruth(frame);
   }
