@@ -47,6 +47,28 @@ std::size_t significant(const LegendreMoments& moments) {
   return count;
 }
 
+// Of degrees below `count`, at a cosine: 4 pi times the function that has these moments alone.
+double seriesAt(const LegendreMoments& moments, std::size_t count, double c) {
+  double previous = 1, current = c, sum = moments[0];
+  for (std::size_t l = 1; l < count; ++l) {
+    const auto n = static_cast<double>(l);
+    sum += (2 * n + 1) * moments[l] * current;
+    const double next = ((2 * n + 1) * c * current - n * previous) / (n + 1);
+    previous = current;
+    current = next;
+  }
+  return sum;
+}
+
+// Least value over its mean of the function that has these moments alone.
+double leastValue(const LegendreMoments& moments) {
+  const int angles = 32 * static_cast<int>(moments.size());
+  double least = std::numeric_limits<double>::infinity();
+  for (int i = 0; i <= angles; ++i)
+    least = std::min(least, seriesAt(moments, moments.size(), std::cos(kPi * i / angles)));
+  return least / moments[0];
+}
+
 }  // namespace
 
 LegendreMoments kernelMoments(const SmoothingKernel& kernel, std::size_t count) {
@@ -66,29 +88,6 @@ LegendreMoments convolved(const LegendreMoments& a, const LegendreMoments& b) {
     product[l] = a[l] * b[l];
   return product;
 }
-
-namespace {
-
-// Least value over its mean of the function that has these moments alone.
-double leastValue(const LegendreMoments& moments) {
-  const int angles = 32 * static_cast<int>(moments.size());
-  double least = std::numeric_limits<double>::infinity();
-  for (int i = 0; i <= angles; ++i) {
-    const double c = std::cos(kPi * i / angles);
-    double previous = 1, current = c, sum = moments[0];
-    for (std::size_t l = 1; l < moments.size(); ++l) {
-      const auto n = static_cast<double>(l);
-      sum += (2 * n + 1) * moments[l] * current;
-      const double next = ((2 * n + 1) * c * current - n * previous) / (n + 1);
-      previous = current;
-      current = next;
-    }
-    least = std::min(least, sum);
-  }
-  return least / moments[0];
-}
-
-}  // namespace
 
 LegendreMoments cutAt(const LegendreMoments& moments, int order, double dip) {
   LegendreMoments cut = moments;
@@ -118,14 +117,7 @@ ZonalTable::ZonalTable(const LegendreMoments& moments) {
   parallelFor(intervals + 1, 64, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const double c = std::cos(kPi * static_cast<double>(i) / static_cast<double>(intervals));
-      double previous = 1, current = c, sum = moments[0];
-      for (std::size_t l = 1; l < count; ++l) {
-        const auto n = static_cast<double>(l);
-        sum += (2 * n + 1) * moments[l] * current;
-        const double next = ((2 * n + 1) * c * current - n * previous) / (n + 1);
-        previous = current;
-        current = next;
-      }
+      const double sum = seriesAt(moments, count, c);
       m_values[i] = static_cast<float>(std::max(0.0, sum / (4 * kPi)));
     }
   });
