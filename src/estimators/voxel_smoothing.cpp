@@ -39,6 +39,22 @@ std::vector<Tap> kernelTaps(SpatialKernel kernel, double radiusInVoxels) {
   return taps;
 }
 
+// Calls visit(number, weight) for the active voxels that the taps about a voxel meet: at least
+// itself. @return the sum of their weights
+template <class Visit>
+float forEachTap(const SupportLattice& lattice, std::size_t voxel, const std::vector<Tap>& taps,
+                 const Visit& visit) {
+  const Vec3i center = lattice.voxel(voxel);
+  float weight = 0.0f;
+  for (const Tap& tap : taps) {
+    const std::int32_t n = lattice.number(center + tap.offset);
+    if (n < 0) continue;
+    visit(static_cast<std::size_t>(n), tap.weight);
+    weight += tap.weight;
+  }
+  return weight;
+}
+
 // Weighted mean over the active neighbours; inactive ones leave both sum and weight.
 Colours convolve(const SupportLattice& lattice, const Colours& colours,
                  const std::vector<Tap>& taps) {
@@ -46,14 +62,9 @@ Colours convolve(const SupportLattice& lattice, const Colours& colours,
   parallelFor(out.size(), 512, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       Vec4f sum(0.0f);
-      float weight = 0.0f;
-      for (const Tap& tap : taps) {
-        const std::int32_t n = lattice.number(lattice.voxel(i) + tap.offset);
-        if (n < 0) continue;
-        sum += tap.weight * colours[static_cast<std::size_t>(n)];
-        weight += tap.weight;
-      }
-      out[i] = sum / weight;  // at least this voxel itself
+      const float weight =
+          forEachTap(lattice, i, taps, [&](std::size_t n, float w) { sum += w * colours[n]; });
+      out[i] = sum / weight;
     }
   });
   return out;
@@ -96,16 +107,11 @@ Colours addBlurred(const SupportLattice& lattice, const std::vector<Tap>& taps, 
   parallelFor(from.size(), 512, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       Vec4f sum(0.0f), lost(0.0f);
-      float weight = 0.0f;
-      for (const Tap& tap : taps) {
-        const std::int32_t n = lattice.number(lattice.voxel(i) + tap.offset);
-        if (n < 0) continue;
-        const Vec4f& other = from[static_cast<std::size_t>(n)];
-        sum += tap.weight * other;
-        lost += tap.weight * glm::max(other - from[i], Vec4f(0.0f));
-        weight += tap.weight;
-      }
-      blurred[i] = sum / weight;  // at least this voxel itself
+      const float weight = forEachTap(lattice, i, taps, [&](std::size_t n, float w) {
+        sum += w * from[n];
+        lost += w * glm::max(from[n] - from[i], Vec4f(0.0f));
+      });
+      blurred[i] = sum / weight;
       lost /= weight;
       const Vec4f may = glm::max(to[i] + kDebt * blurred[i], Vec4f(0.0f));
       for (int c = 0; c < 4; ++c)
@@ -116,16 +122,11 @@ Colours addBlurred(const SupportLattice& lattice, const std::vector<Tap>& taps, 
   parallelFor(from.size(), 512, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       Vec4f sum(0.0f);
-      float weight = 0.0f;
-      for (const Tap& tap : taps) {
-        const std::int32_t n = lattice.number(lattice.voxel(i) + tap.offset);
-        if (n < 0) continue;
-        const Vec4f part = from[i] - from[static_cast<std::size_t>(n)];
-        const Vec4f& given = share[static_cast<std::size_t>(n)];
-        sum += tap.weight *
-               (glm::max(part, Vec4f(0.0f)) * given + glm::min(part, Vec4f(0.0f)) * share[i]);
-        weight += tap.weight;
-      }
+      const float weight = forEachTap(lattice, i, taps, [&](std::size_t n, float w) {
+        const Vec4f part = from[i] - from[n];
+        sum +=
+            w * (glm::max(part, Vec4f(0.0f)) * share[n] + glm::min(part, Vec4f(0.0f)) * share[i]);
+      });
       out[i] = to[i] + sum / weight;
     }
   });
