@@ -90,8 +90,8 @@ LegendreMoments convolved(const LegendreMoments& a, const LegendreMoments& b) {
 }
 
 LegendreMoments cutAt(const LegendreMoments& moments, int order, double dip) {
-  LegendreMoments cut = moments;
-  cut.resize(static_cast<std::size_t>(order) + 1, 0.0);
+  LegendreMoments cut(static_cast<std::size_t>(order) + 1, 0.0);
+  std::copy_n(moments.begin(), std::min(moments.size(), cut.size()), cut.begin());
   const auto spread = [&cut](double time) {
     LegendreMoments out = cut;
     for (std::size_t l = 0; l < out.size(); ++l)

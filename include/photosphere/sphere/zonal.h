@@ -21,7 +21,7 @@ LegendreMoments convolved(const LegendreMoments& a, const LegendreMoments& b);
 /// the sphere, f_l exp(-t l (l + 1)), for the least time t at which what is left of it dips below
 /// zero by no more than `dip` of its mean: cut where a narrow lobe still has much above the order,
 /// a series rings from pole to pole.
-/// @param dip  0 or more; one that is never reached leaves t = 0
+/// @param dip  0 or more
 LegendreMoments cutAt(const LegendreMoments& moments, int order, double dip);
 
 /// A function of the angle between two unit directions as a table, from its moments; never
