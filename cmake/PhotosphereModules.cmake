@@ -35,7 +35,8 @@ endfunction()
 #
 # Declares photosphere_<name>.so from loaded/<name>.cpp of the calling folder, which takes no part in the
 # module: it links libraries that most runs do not need, and is loaded by name when it is. Programs of
-# this build find it by CMAKE_BUILD_RPATH, others by what PhotosphereInstall.cmake sets.
+# this build find it by CMAKE_BUILD_RPATH, the installed tool by its INSTALL_RPATH, programs that link the
+# library by the link options that it passes on (src/CMakeLists.txt).
 function(photosphere_loaded)
   cmake_parse_arguments(PARSE_ARGV 0 arg "" "NAME" "LIBRARIES")
   set(target photosphere_${arg_NAME})

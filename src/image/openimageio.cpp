@@ -11,7 +11,7 @@ namespace {
 constexpr const char* kFile = "photosphere_openimageio.so";
 
 const OpenImageIo& load() {
-  // Found by the run path of the program (cmake/PhotosphereInstall.cmake). Never unloaded.
+  // Found by the run path of the program (photosphere_loaded in cmake). Never unloaded.
   void* library = dlopen(kFile, RTLD_LAZY | RTLD_LOCAL);
   const void* symbol = library ? dlsym(library, kOpenImageIoSymbol) : nullptr;
   if (!symbol)

@@ -1,6 +1,6 @@
 #pragma once
-// What is asked of OpenImageIO. It brings some 250 libraries with it, which take a quarter of a
-// second of processor time to load; so a library of its own, photosphere_openimageio.so, links
+// What is asked of OpenImageIO. It brings 236 libraries with it, which take 0.2 s of processor time
+// to load; so a library of its own, photosphere_openimageio.so, links
 // them, and is loaded by the first picture that is read or encoded. Most frames have none.
 
 #include <cstddef>
