@@ -62,8 +62,10 @@ class SourceChoice {
   }
   double total() const { return m_total; }
   bool dark() const { return !(m_total > 0); }
-  std::size_t choose(float u) const {
-    const double target = static_cast<double>(u) * m_total;
+  /// @param u  of 53 bits: a float has none left for a lamp next to one that is 2^24 times as
+  /// strong
+  std::size_t choose(double u) const {
+    const double target = u * m_total;
     const auto at = std::upper_bound(m_cumulative.begin(), m_cumulative.end(), target);
     return std::min(static_cast<std::size_t>(at - m_cumulative.begin()), m_cumulative.size() - 1);
   }
@@ -112,7 +114,7 @@ class Births {
   // The first flight of a photon, clipped to the medium's bounds; of length 0 where it misses them.
   template <class When>
   Flight operator()(std::uint64_t photon, Rng& rng, When when) const {
-    const std::size_t source = m_choice.choose(m_sequence(photon, 0));
+    const std::size_t source = m_choice.choose(m_sequence.fine(photon, 0));
     Flight flight;
     flight.photon = photon;
     Place place{m_sequence.fine(photon, 1), m_sequence(photon, 2)};
