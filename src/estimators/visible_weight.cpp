@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "photosphere/core/rng.h"
 #include "photosphere/transport/tracking.h"
 
 namespace photosphere::estimators {
@@ -17,6 +16,12 @@ constexpr float kStepDepth = 4.0f;  // of a step that begins in thin smoke
 constexpr float kHidden = 0.02f;
 // Lines toward the eye along each edge of a voxel's face that is turned to it.
 constexpr double kLines = 4;
+// Voxel edges from the eye within which lines are not parallel, points along each edge of such a
+// voxel, optical depth of a step through it, and transmittance below which nothing is seen.
+constexpr double kNearby = 2.0;
+constexpr int kPoints = 4;
+constexpr float kFineDepth = 0.5f;
+constexpr float kUnseen = 1e-4f;
 constexpr RandomKey kLinesKey{0x9e3779b9u, 0x7f4a7c15u};
 
 }  // namespace
@@ -26,42 +31,74 @@ float VisibleWeight::wayOut(std::size_t voxel, const Vec3f& p, const Vec3f& d) c
   return transport::exitDistance(-half, half, p - m_lattice.center(voxel), d);
 }
 
+float VisibleWeight::beyond(const Vec3f& p, const Vec3f& d) const {
+  const double most = 2 * m_lattice.edge();
+  if (!m_view.hasEye) return static_cast<float>(most);
+  return static_cast<float>(std::clamp(glm::dot(m_view.eye - Vec3d(p), Vec3d(d)), 0.0, most));
+}
+
 float VisibleWeight::at(std::size_t voxel, const Vec3f& p) const {
   const float sigma = m_medium.extinction(p);
   if (!(sigma > 0.0f)) return 0.0f;
   const Vec3f d = m_view.toEye(p);
-  const float hidden = depth(p, d, wayOut(voxel, p, d) + beyond());
+  float length = wayOut(voxel, p, d);
+  length += beyond(p + d * length, d);
+  if (m_view.hasEye)
+    length = std::min(length, static_cast<float>(glm::length(m_view.eye - Vec3d(p))));
+  const float hidden = depth(p, d, length);
   if (hidden >= kOpaque) return 0.0f;
   return sigma * static_cast<float>(m_lattice.edge()) * std::exp(-hidden);
 }
 
-float VisibleWeight::depth(const Vec3f& p, const Vec3f& d, float length) const {
+// Hands on steps: where each begins, its length and optical depth, at most `stepDepth` in smoke
+// that thickens no faster than it can. Ends when `visit` returns false.
+template <class Visit>
+void VisibleWeight::walk(const Vec3f& p, const Vec3f& d, float length, float stepDepth,
+                         const Visit& visit) const {
   const auto extinction = m_medium.alongRay(p, d, transport::Still{});
   const float steepness = m_medium.steepness();
   const float slope = m_medium.majorants().maximum() * steepness;
   const float longest = 0.5f * static_cast<float>(m_medium.voxelEdge());
   const float shortest = transport::kDistanceResolution * (length + glm::length(p));
-  float sum = 0.0f;
-  for (float t = 0.0f; t < length && sum < kOpaque;) {
+  for (float t = 0.0f; t < length;) {
     const float here = transport::extinctionOnward(extinction, t, 1.0f / steepness);
     const float part =
-        std::max(shortest, std::min(longest, transport::thinPart(here, slope, kStepDepth)));
+        std::max(shortest, std::min(longest, transport::thinPart(here, slope, stepDepth)));
     const float h = std::min(part, length - t);
-    sum += h * extinction(t + 0.5f * h);
+    if (!visit(t, h, h * extinction(t + 0.5f * h))) return;
     t += part;
   }
+}
+
+float VisibleWeight::depth(const Vec3f& p, const Vec3f& d, float length) const {
+  float sum = 0.0f;
+  walk(p, d, length, kStepDepth, [&](float, float, float part) {
+    sum += part;
+    return sum < kOpaque;
+  });
   return sum;
 }
 
 float VisibleWeight::mean(std::size_t voxel) const {
+  const double edge = m_lattice.edge();
+  const bool nearby =
+      m_view.hasEye && glm::length(m_view.eye - Vec3d(m_lattice.center(voxel))) < kNearby * edge;
+  return nearby ? meanNearby(voxel) : meanFromAfar(voxel);
+}
+
+Rng VisibleWeight::linesOf(std::size_t voxel) const {
+  const Vec3i cell = m_lattice.voxel(voxel);
+  return {kLinesKey, RandomStream::visibility,
+          static_cast<std::uint64_t>(cell.x) | static_cast<std::uint64_t>(cell.y) << 21 |
+              static_cast<std::uint64_t>(cell.z) << 42};
+}
+
+float VisibleWeight::meanFromAfar(std::size_t voxel) const {
   const Vec3f center = m_lattice.center(voxel);
   const auto edge = static_cast<float>(m_lattice.edge());
   const Vec3f d = m_view.toEye(center);
   const Vec3f across = glm::abs(d);
-  const Vec3i cell = m_lattice.voxel(voxel);
-  Rng rng(kLinesKey, RandomStream::visibility,
-          static_cast<std::uint64_t>(cell.x) | static_cast<std::uint64_t>(cell.y) << 21 |
-              static_cast<std::uint64_t>(cell.z) << 42);
+  Rng rng = linesOf(voxel);
   float sum = 0.0f, open = 0.0f;
   // The integral of sigma_t T over the voxel is that over the faces turned to the eye of T where a
   // line leaves, less T where it entered.
@@ -80,9 +117,45 @@ float VisibleWeight::mean(std::size_t voxel) const {
       const float absorbed = share * -std::expm1(-depth(p - d * in, d, in));
       if (!(absorbed > 0.0f)) continue;
       open += absorbed;
-      const float hidden = depth(p, d, beyond());
+      const float hidden = depth(p, d, beyond(p, d));
       if (hidden < kOpaque) sum += std::exp(-hidden) * absorbed;
     }
+  }
+  return sum < kHidden * open ? 0.0f : sum;
+}
+
+// A line from the eye through a random point of the voxel has sigma_t T r^2, integrated over what
+// it has of the voxel, for the r^2 of the same: the mean over points of their quotient is that of
+// sigma_t T over the volume, and finds the little of thick smoke that an eye inside it sees.
+float VisibleWeight::meanNearby(std::size_t voxel) const {
+  const Vec3f center = m_lattice.center(voxel);
+  const auto edge = static_cast<float>(m_lattice.edge());
+  Rng rng = linesOf(voxel);
+  float sum = 0.0f, open = 0.0f;
+  for (int i = 0; i < kPoints * kPoints * kPoints; ++i) {
+    const Vec3f cell(i % kPoints, i / kPoints % kPoints, i / (kPoints * kPoints));
+    const Vec2f u = rng.uniform2();
+    const Vec3f p =
+        center + edge * ((cell + Vec3f(u, rng.uniform())) / static_cast<float>(kPoints) - 0.5f);
+    const Vec3f d = m_view.toEye(p);
+    const auto away = static_cast<float>(glm::length(m_view.eye - Vec3d(p)));
+    const float forth = std::min(away, wayOut(voxel, p, d));
+    const float nearest = away - forth;
+    const float farthest = away + wayOut(voxel, p, -d);
+    float seen = 0.0f, passed = 1.0f;
+    walk(p + d * forth, -d, farthest - nearest, kFineDepth, [&](float t, float h, float part) {
+      const float a = nearest + t, b = a + h;
+      const float left = passed * std::exp(-part);
+      seen += (passed - left) * (a * a + a * b + b * b) / 3.0f;
+      passed = left;
+      return passed > kUnseen;
+    });
+    const float whole = (farthest * farthest * farthest - nearest * nearest * nearest) / 3.0f;
+    if (!(seen > 0.0f) || !(whole > 0.0f)) continue;
+    const float part = edge * seen / whole / static_cast<float>(kPoints * kPoints * kPoints);
+    open += part;
+    const float hidden = depth(p + d * forth, d, std::min(nearest, beyond(p + d * forth, d)));
+    if (hidden < kOpaque) sum += std::exp(-hidden) * part;
   }
   return sum < kHidden * open ? 0.0f : sum;
 }

@@ -1,6 +1,7 @@
 #pragma once
 // What the eye sees of a place in the smoke: the weight of Smoothing::visible.
 
+#include "photosphere/core/rng.h"
 #include "photosphere/estimators/inscatter.h"
 #include "photosphere/transport/support_lattice.h"
 
@@ -26,9 +27,17 @@ class VisibleWeight {
  private:
   // Way from `p` along `d` until it leaves the voxel [m].
   float wayOut(std::size_t voxel, const Vec3f& p, const Vec3f& d) const;
-  float beyond() const { return 2.0f * static_cast<float>(m_lattice.edge()); }
+  // Beyond a voxel, from a point of its surface along a direction to the eye or all but that.
+  float beyond(const Vec3f& p, const Vec3f& d) const;
   // Optical depth, summed up to where it is opaque.
   float depth(const Vec3f& p, const Vec3f& d, float length) const;
+  template <class Visit>
+  void walk(const Vec3f& p, const Vec3f& d, float length, float stepDepth,
+            const Visit& visit) const;
+  Rng linesOf(std::size_t voxel) const;
+  // Of a voxel that the eye sees along parallel lines, or around it.
+  float meanFromAfar(std::size_t voxel) const;
+  float meanNearby(std::size_t voxel) const;
 
   const transport::Medium& m_medium;
   const transport::SupportLattice& m_lattice;

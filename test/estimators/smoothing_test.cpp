@@ -128,6 +128,28 @@ TEST(FluenceSmoothing, WhatTheEyeSeesOfOpaqueVoxelsIsKept) {
   }
 }
 
+// An eye that flies into thick smoke goes on seeing it: in a furnace, as bright as outside.
+TEST(FluenceSmoothing, WhatAnEyeInsideSeesIsKept) {
+  if (kSanitized) GTEST_SKIP() << "a path to many scatterings, too slow under a sanitizer";
+  TestScene scene;
+  scene.medium = std::make_unique<transport::Medium>(
+      makeMedium(sampledVolume(1.0, 16, {1.0, 0.0, 40.0},
+                               [](const Vec3d& p) { return glm::length(p) < 0.45 ? 1.0 : 0.0; })));
+  scene.lights.push_back(makeLight("environment", {{"color", "[1, 1, 1]"}}));
+  LightFieldLayout layout;
+  layout.channels = 1;
+  layout.smoothing = Smoothing::visible;
+  layout.radius = 0.5 * layout.lightVoxel * scene.medium->voxelEdge();
+  for (const double z : {0.6, 0.45, 0.4, 0.35}) {
+    scene.camera = perspectiveCamera({0.02, 0.01, z}, 40, 16);
+    const PhotosphereFrame frame = renderPhotosphere(scene, layout, 400'000, 5);
+    const BlockDeviation furnace = deviationFromOne(frame.layers.beauty, 16, 8);
+    std::printf("  eye at %.2f: mean %.4f worst %.4f\n", z, furnace.mean, furnace.worst);
+    EXPECT_NEAR(furnace.mean, 1.0, 0.15) << z;
+    EXPECT_LT(furnace.worst, 0.2) << z;
+  }
+}
+
 // Collisions are weighed as track lengths are.
 TEST(FluenceSmoothing, WhatTheEyeSeesOfCollisionsIsKept) {
   if (kSanitized) GTEST_SKIP() << "a mean of many paths, too slow under a sanitizer";
