@@ -226,8 +226,9 @@ class PathIntegrator final : public Integrator {
     const lights::Illumination in = light.illuminate(p, u);
     if (!(maxComponent(in.irradiance) > 0.0f)) return;
     const Rgb scattered = transport::phaseAlbedo(m_medium, p, in.direction, -d, when);
+    // The switch is of single scattering alone.
     const Light transmittance =
-        m_options.effects.shadows
+        m_options.effects.shadows || scatterings > 0
             ? transport::trackTransmittance<Light>(m_medium, p, -in.direction, in.distance, rng,
                                                    counters.tracking, when)
             : Light(1.0f);

@@ -303,7 +303,7 @@ class EffectPlan {
     if (!decision.on || isOn("shadows")) return decision;
     double most = 0;
     for (const LampBound& lamp : m_lamps)
-      most += adds({lamp.single, lamp.multiple}) * lamp.shadow;
+      most += lamp.single * lamp.shadow;
     if (const std::optional<double> bound = afford(most))
       return {false, "the smoke is thin: its shadows take away " + share(*bound), bound};
     return decision;

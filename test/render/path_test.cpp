@@ -50,6 +50,28 @@ TEST(PathTracing, FurnaceByNextEventIsOneWithinFourStandardErrors) {
   }
 }
 
+// The switch is of single scattering: light on its way to a second event is taken away as ever.
+TEST(PathTracing, ShadowsThatAreOffAreThoseOfSingleScattering) {
+  const transport::Medium medium =
+      makeMedium(sampledVolume(1.0, 16, {0.9, 0.0, 8.0}, plumeDensity));
+  transport::LightList lights;
+  lights.push_back(makeLight("point", {{"position", "[0, 2, 0.5]"}, {"intensity", "10"}}));
+  render::PathOptions options;
+  const auto with = render::makePathIntegrator(medium, lights, options);
+  options.effects.shadows = false;
+  const auto without = render::makePathIntegrator(medium, lights, options);
+  const Vec3f d = glm::normalize(Vec3f(0.02f, 1.0f, 0.01f));
+  const int count = kSanitized ? 5000 : 50000;
+  const auto single = [](const RayRadiance& r) { return static_cast<double>(r.single.y); };
+  const auto multiple = [](const RayRadiance& r) { return static_cast<double>(r.multiple.y); };
+  EXPECT_GT(estimate(*without, Vec3d(d) * -2.0, d, count, single).mean,
+            1.3 * estimate(*with, Vec3d(d) * -2.0, d, count, single).mean);
+  const Estimate a = estimate(*with, Vec3d(d) * -2.0, d, count, multiple);
+  const Estimate b = estimate(*without, Vec3d(d) * -2.0, d, count, multiple);
+  EXPECT_NEAR(a.mean, b.mean, 4 * std::hypot(a.error, b.error));
+  EXPECT_LT(4 * std::hypot(a.error, b.error), 0.2 * a.mean);
+}
+
 TEST(PathTracing, TransmittanceFollowsBeerAndLambert) {
   const transport::Medium medium = makeMedium(boxVolume(Vec3d(2.0), Vec3i(16), {0.0, 0.0, 1.5}));
   const transport::LightList lights;
