@@ -154,12 +154,17 @@ void addReferenceChecks(const StudyResult& result, std::vector<std::string>& out
           "rare "
           "bright paths are still missing. Give it more --minutes.",
           sweep.name, spread, claimed));
-    else if (!sweep.reference.targetReached)
+    else if (!sweep.reference.quiet)
       out.push_back(fmt::format(
           "{}: the reference's noise (relMSE {:.2g} in layer multiple) is above a tenth "
           "of the best contender's error; it is subtracted, but more --minutes would "
           "make it surer.",
           sweep.name, std::max(spread, claimed)));
+    else if (!sweep.reference.settled)
+      out.push_back(fmt::format(
+          "{}: the reference may still lack rare bright paths: it has not been seen that twice as "
+          "many paths show the contenders no better. More --minutes would tell.",
+          sweep.name));
   }
 }
 

@@ -132,6 +132,8 @@ std::vector<std::string> neutralEstimator(const scene::SceneFile& scene) {
   for (const Param& row : scene.estimator.rows())
     if (scene.estimator.given(row.name))
       sets.push_back(fmt::format("estimator.{}={}", row.name, defaults.format(row.name)));
+  for (const char* name : {"target_error", "time_limit"})
+    if (scene.render.real(name) > 0) sets.push_back(fmt::format("render.{}=0", name));
   return sets;
 }
 

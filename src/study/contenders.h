@@ -59,8 +59,9 @@ std::vector<Contender> contenders(const SceneSource& scene, const SweepSize& siz
                                   const std::vector<std::string>& particleSets,
                                   std::vector<LeftOut>& leftOut);
 
-/// Overrides that take every key of [estimator] that the scene gives back to its default, so that
-/// contenders differ by their own settings alone.
+/// Overrides that take every key of [estimator] that the scene gives back to its default, and its
+/// target error and time limit away, so that contenders differ by their own settings alone and
+/// nothing ends a reference early.
 std::vector<std::string> neutralEstimator(const scene::SceneFile& scene);
 
 /// "16k", "1.0M".

@@ -272,7 +272,11 @@ bool ReferenceMaker::addPair(const Method& method, bool mayFail, ReferenceImage&
     const Scratch scratch(m_folder / fmt::format(".chunk-{}-{}.exr", m_key, getpid()));
     job.image = scratch.path;
     const RenderOutcome outcome = renderInChild(job);
-    if (outcome.failed && mayFail) return false;
+    // Not every scene can be rendered from the lamps; what else fails is worth knowing of.
+    if (outcome.failed && mayFail && outcome.code == ExitCode::usage) {
+      log::info("reference: no {} paths: {}", method.type, outcome.message);
+      return false;
+    }
     if (outcome.failed) throw Error(outcome.code, "reference: " + outcome.message);
     halves[half] = image::readExr(job.image).image;
   }

@@ -255,7 +255,10 @@ Table referenceTable(const StudyResult& result) {
                           fmt::format("{:.1f}", r.seconds), fmt::format("{:.2g}", r.noise[kTotal]),
                           fmt::format("{:.2g}", r.noise[kMultiple]),
                           fmt::format("{:.2g}", r.pathNoise[kMultiple]),
-                          r.targetReached ? "yes" : "no", r.key});
+                          !r.quiet    ? "no"
+                          : r.settled ? "yes"
+                                      : "yes, unsettled",
+                          r.key});
   }
   return table;
 }

@@ -263,8 +263,9 @@ void Sweep::refine() {
   while (true) {
     if (image.pairs > 0) looks.push_back({image.pairs, bestErrors()});
     double factor = looks.empty() ? 2 : stillNeeded(looks.back().best);
-    m_targetReached = factor <= 1 && settled(looks);
-    if (m_targetReached) return;
+    m_quiet = factor <= 1;
+    m_settled = !looks.empty() && settled(looks);
+    if (m_quiet && m_settled) return;
     factor = std::max(factor, 1.01);
     const double needed = factor * static_cast<double>(std::max<std::uint64_t>(1, image.pairs));
     // Look again after a quarter more samples: looking costs time as well.
@@ -339,11 +340,16 @@ SweepResult Sweep::evaluate() const {
   result.startMemoryBytes = m_startMemory;
   result.leftOut = m_leftOut;
   const ReferenceImage& reference = m_reference->image();
-  result.reference = {m_reference->key(),    reference.method,
-                      m_reference->origin(), m_reference->samplesBefore(),
-                      reference.samples,     m_reference->seconds(),
-                      reference.noise(),     pathNoise(),
-                      m_targetReached};
+  result.reference = {m_reference->key(),
+                      reference.method,
+                      m_reference->origin(),
+                      m_reference->samplesBefore(),
+                      reference.samples,
+                      m_reference->seconds(),
+                      reference.noise(),
+                      pathNoise(),
+                      m_quiet,
+                      m_settled};
   result.referenceImage = reference.pixels;
   const auto smoke = image::smokeMask(reference.pixels);
   // Family by family, where the entries go level by level.

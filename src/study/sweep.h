@@ -73,7 +73,7 @@ class Sweep {
   std::vector<Entry> m_entries;
   std::vector<LeftOut> m_leftOut;
   std::optional<ReferenceMaker> m_reference;
-  bool m_targetReached = false;
+  bool m_quiet = false, m_settled = false;
   std::uint64_t m_startMemory = 0;
 };
 

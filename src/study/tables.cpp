@@ -84,7 +84,8 @@ Json toJson(const SweepResult& sweep) {
             {"noise_rel_mse_multiple", number(r.noise[kMultiple])},
             {"noise_by_contenders_total", number(r.pathNoise[kTotal])},
             {"noise_by_contenders_multiple", number(r.pathNoise[kMultiple])},
-            {"noise_within_a_tenth_of_the_best", r.targetReached}}},
+            {"noise_within_a_tenth_of_the_best", r.quiet},
+            {"settled", r.settled}}},
           {"points", std::move(points)},
           {"left_out", toJson(sweep.leftOut)}};
 }

@@ -84,7 +84,8 @@ struct ReferenceNote {
   /// The same from the spread of contenders of the reference's own method, whose weights do not
   /// depend on the reference's outliers; 0 where there are none.
   std::array<double, 2> pathNoise{};
-  bool targetReached = false;  ///< noise at most a tenth of the best contender's relMSE
+  bool quiet = false;    ///< noise at most a tenth of the best contender's relMSE
+  bool settled = false;  ///< twice as many paths showed the contenders no better
 };
 
 /// One scene swept.
