@@ -1,7 +1,7 @@
 #include "photosphere/render/light_paths.h"
 
-#include <fmt/format.h>
-
+#include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <optional>
 
@@ -123,7 +123,7 @@ class Film {
   }
 
   /// @param value  light times pixels
-  void add(const Vec2d& raster, const Rgb& value, const Flight& flight) {
+  void add(const Vec2d& raster, const Vec3d& value, const Flight& flight) {
     forEachImage(raster, [&](const Vec2d& place) {
       const Pixels on = covered(place);
       for (int y = on.min.y; y < on.max.y; ++y)
@@ -137,7 +137,7 @@ class Film {
           // Rounded by the pixel's place in the frame: the crop changes no bit.
           const auto deposit = static_cast<std::uint32_t>(y) << 16 ^ static_cast<std::uint32_t>(x);
           for (std::size_t c = 0; c < 3; ++c)
-            m_sums.add(3 * pixel + c, weight * static_cast<double>(value[static_cast<int>(c)]),
+            m_sums.add(3 * pixel + c, weight * value[static_cast<int>(c)],
                        roundingBits(m_key, flight.photon, flight.ordinal,
                                     4 * deposit + static_cast<std::uint32_t>(c)));
         }
@@ -183,39 +183,98 @@ class Film {
   FixedSums m_sums;
 };
 
-// The light of a pixel whose photons share `power` evenly over the smoke's disc [W m^-2 sr^-1]: of
-// the size of what is summed, which is all that a quantum needs.
+// The light of a pixel in the middle of the picture if all photons scattered in the smoke's disc
+// there [W m^-2 sr^-1]: of the size of what is summed, which is all that a quantum needs. Not where
+// the smoke lies in the picture: off the axis a pixel covers next to nothing.
 double typicalLight(const cameras::Camera& camera, const lights::LocalSpace& space,
                     const lights::BoundingSphere& smoke, double power) {
   const Vec3d center = space.worldFromLocal(smoke.center);
   const double radius = std::max(smoke.radius / space.metersPerUnit, 1e-300);
-  const Vec2d size(camera.resolution());
-  double perArea = size.x * size.y / (radius * radius);
-  const bool outside = !camera.hasEye() || glm::length(center - camera.position()) > radius;
-  if (const auto seen = camera.project(center); seen && outside) perArea = seen->pixelsPerArea();
+  const cameras::CameraRay middle = camera.ray(0.5 * Vec2d(camera.resolution()));
+  const double away = std::max(radius, glm::length(center - middle.origin));
+  const auto seen = camera.project(middle.origin + away * middle.direction);
+  const double perArea = seen ? seen->pixelsPerArea() : 0.0;
   return power * perArea / (4 * kPi * space.metersPerUnit * space.metersPerUnit);
+}
+
+// Units of a photon of that light, if there are no more than this many; of more photons the sum
+// keeps its room, and the quantum stays far below what one of them brings.
+constexpr double kUnits = 0x1p24;
+constexpr double kPhotons = 0x1p20;
+
+double quantumOf(double light, std::uint64_t photons) {
+  const double quantum = light / kUnits * std::max(1.0, static_cast<double>(photons) / kPhotons);
+  return quantum > 0 && std::isfinite(quantum) ? quantum : 1.0;
+}
+
+// What all threads have joined to the eye.
+struct JoinCounts {
+  std::atomic<std::uint64_t> joined{0}, majorantViolations{0}, capped{0};
+  std::atomic<double> cappedPower{0.0};
+
+  void keep(StateWriter& w) const {
+    w.value(joined.load());
+    w.value(majorantViolations.load());
+    w.value(capped.load());
+    w.value(cappedPower.load());
+  }
+  void resume(StateReader& r) {
+    for (auto* count : {&joined, &majorantViolations, &capped})
+      *count = r.value<std::uint64_t>();
+    cappedPower = r.value<double>();
+  }
+};
+
+[[noreturn]] void refuseBrightness() {
+  throw Error(ExitCode::unspecified,
+              "photons were too bright for a pixel's 64-bit sum: the eye is all but where they "
+              "scatter; move it, or use estimator.type = \"path_traced\"");
 }
 
 // Joins every collision that is not a lamp's first to the eye.
 template <class Light>
 class EyeSink final : public transport::FlightSink {
  public:
-  EyeSink(const Medium& medium, const Eye& eye, RandomKey key, Film& film)
-      : m_medium(medium), m_eye(eye), m_key(key), m_film(film) {}
+  EyeSink(const Medium& medium, const Eye& eye, const LightPathOptions& options, Film& film,
+          JoinCounts& counts)
+      : m_medium(medium), m_eye(eye), m_options(options), m_film(film), m_counts(counts) {}
 
   void consume(std::span<const Flight> flights) override {
     transport::TrackingCounters counters;
     for (const Flight& flight : flights)
-      if (flight.collided() &&
-          (flight.scatterings > 0 || flight.light == transport::kEmittedBySmoke))
-        join(flight, counters);
+      if (flight.collided() && isSought(flight)) {
+        if (isBeyondCap(flight))
+          count(flight);
+        else
+          join(flight, counters);
+      }
+    m_counts.majorantViolations += counters.majorantViolations;
+    // What is left of the trace would be for nothing.
+    if (m_film.sums().overflows > 0) refuseBrightness();
   }
 
  private:
+  // A lamp's first collision is single scattering; the smoke's own is not.
+  static bool isSought(const Flight& flight) {
+    return flight.scatterings > 0 || flight.light == transport::kEmittedBySmoke;
+  }
+
+  bool isBeyondCap(const Flight& flight) const {
+    return m_options.maxScatter > 0 &&
+           flight.scatterings >= static_cast<std::uint32_t>(m_options.maxScatter);
+  }
+
+  // Once a photon.
+  void count(const Flight& flight) {
+    if (flight.scatterings > static_cast<std::uint32_t>(m_options.maxScatter)) return;
+    ++m_counts.capped;
+    m_counts.cappedPower += static_cast<double>(meanComponent(flight.power));
+  }
+
   void join(const Flight& flight, transport::TrackingCounters& counters) {
     const Vec3f p = flight.origin + flight.direction * flight.length;
-    Rng rng(m_key, RandomStream::connection,
-            depositHash(m_key, flight.photon, flight.ordinal, ~0u));
+    Rng rng(m_options.key, RandomStream::connection,
+            depositHash(m_options.key, flight.photon, flight.ordinal, ~0u));
     const auto sight = m_eye.see(p, rng);
     if (!sight || !m_film.reaches(sight->raster)) return;
     const Rgb scattered =
@@ -224,25 +283,28 @@ class EyeSink final : public transport::FlightSink {
     const float inside = transport::exitDistance(m_medium, p, sight->direction);
     const Light passed = transport::trackTransmittance<Light>(
         m_medium, p, sight->direction, std::min(sight->distance, inside), rng, counters);
-    const Rgb value = scattered * passed * static_cast<float>(sight->pixelsPerArea);
-    if (maxComponent(value) > 0.0f) m_film.add(sight->raster, value, flight);
+    const Vec3d value = Vec3d(scattered * passed) * sight->pixelsPerArea;
+    if (!(std::max({value.x, value.y, value.z}) > 0)) return;
+    ++m_counts.joined;
+    m_film.add(sight->raster, value, flight);
   }
 
   const Medium& m_medium;
   const Eye& m_eye;
-  RandomKey m_key;
+  const LightPathOptions& m_options;
   Film& m_film;
+  JoinCounts& m_counts;
 };
 
 }  // namespace
 
-std::vector<Rgb> traceLightPaths(const cameras::Camera& camera, const Medium& medium,
-                                 const transport::LightList& lights,
-                                 const LightPathOptions& options,
-                                 transport::TraceStatistics& statistics) {
-  const double light = typicalLight(camera, options.space, transport::boundingSphere(medium),
-                                    transport::sharedPower(medium, lights));
-  Film film(camera, options, light > 0 && std::isfinite(light) ? light * 0x1p-24 : 1.0);
+LightPaths traceLightPaths(const cameras::Camera& camera, const Medium& medium,
+                           const transport::LightList& lights, const LightPathOptions& options) {
+  const double power = transport::sharedPower(medium, lights);
+  const double light =
+      typicalLight(camera, options.space, transport::boundingSphere(medium), power);
+  Film film(camera, options, quantumOf(light, options.photons));
+  JoinCounts counts;
   const Eye eye(camera, options.space, options.lens);
   transport::TraceOptions trace;
   trace.photons = options.photons;
@@ -250,38 +312,37 @@ std::vector<Rgb> traceLightPaths(const cameras::Camera& camera, const Medium& me
   trace.guide = options.guide;
   const transport::TraceKeeping keeping{options.checkpoint, options.part,
                                         [&](StateWriter& w) {
-                                          w.value(film.sums().overflows.load());
+                                          counts.keep(w);
                                           w.value(film.sums().sums);
                                         },
                                         [&](StateReader& r) {
-                                          film.sums().overflows = r.value<std::uint64_t>();
+                                          counts.resume(r);
                                           r.value(film.sums().sums);
                                           if (film.sums().sums.size() != 3 * film.pixels())
                                             r.fail();
                                         }};
+  LightPaths paths;
   const auto run = [&]<class Light>(Light) {
-    EyeSink<Light> sink(medium, eye, options.key, film);
-    statistics = transport::tracePhotons(medium, lights, trace, sink, keeping);
+    EyeSink<Light> sink(medium, eye, options, film, counts);
+    paths.traced = transport::tracePhotons(medium, lights, trace, sink, keeping);
   };
   if (medium.isColoured())
     run(Rgb());
   else
     run(float());
+  paths.joined = counts.joined;
+  paths.capped = counts.capped;
+  if (power > 0) paths.cappedShare = counts.cappedPower / power;
+  paths.traced.majorantViolations += counts.majorantViolations;
   const FixedSums& sums = film.sums();
-  if (sums.overflows > 0)
-    throw Error(ExitCode::unspecified,
-                fmt::format("{} photons were too bright for a pixel's 64-bit sum: the eye is all "
-                            "but where they scatter; move it, or use estimator.type = "
-                            "\"path_traced\"",
-                            sums.overflows.load()));
   const double worth =
       sums.quantum / static_cast<double>(std::max<std::uint64_t>(1, trace.photons));
-  std::vector<Rgb> pixels(film.pixels());
-  for (std::size_t i = 0; i < pixels.size(); ++i)
+  paths.multiple.resize(film.pixels());
+  for (std::size_t i = 0; i < paths.multiple.size(); ++i)
     for (std::size_t c = 0; c < 3; ++c)
-      pixels[i][static_cast<int>(c)] =
+      paths.multiple[i][static_cast<int>(c)] =
           static_cast<float>(static_cast<double>(sums.sums[3 * i + c]) * worth);
-  return pixels;
+  return paths;
 }
 
 }  // namespace photosphere::render

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "layer_renderer.h"
 #include "pass_light.h"
@@ -20,6 +21,8 @@ constexpr double kSettled = 0.1;
 // Paths from the lamps take longer: they are the truth where their squared noise is this part of
 // that of paths from the eye.
 constexpr double kFarQuieter = 0.3;
+// Collisions in view below which it is not known how noisy they are.
+constexpr std::uint64_t kFewestJoined = 100;
 
 constexpr const char* kPart = "frame";  // of the checkpoint
 
@@ -37,6 +40,8 @@ void eachNumber(Statistics& s, State& state) {
     state.value(*power);
   state.value(s.majorantViolations);
   state.value(s.clampedLight);
+  state.value(s.pathsCapped);
+  state.value(s.pathsCappedRadiance);
 }
 
 // The frame in independent batches, each of photons, samples and random numbers of its own, until
@@ -137,7 +142,7 @@ class FrameLoop {
     const Stopwatch watch;
     if (!m_renderer) m_renderer.emplace(m_scene, m_crop, m_setup);
     if (m_fromLamps)
-      m_error.addTruth(truth(m_error.truths(), *m_fromLamps));
+      m_error.addTruth(truth(m_error.truths(), *m_fromLamps).beauty);
     else
       beginTruths();
     m_result.statistics.seconds.check += watch.seconds();
@@ -150,24 +155,29 @@ class FrameLoop {
     const auto two = [&](bool fromLamps) {
       return std::array{truth(0, fromLamps), truth(1, fromLamps)};
     };
-    const auto noise = [&](const auto& frames) {
-      return blockDifference(frames[0], frames[1], m_crop.max.x - m_crop.min.x);
-    };
     // What is kept after a signal knows of no choice before both ends have been tried.
     auto truths = two(false);
     bool fromLamps = false;
     if (!m_setup.medium->isMoving() && !m_setup.motion)
-      if (auto lamps = two(true); noise(lamps) < kFarQuieter * noise(truths)) {
+      if (auto lamps = two(true); areFarQuieter(lamps, truths)) {
         fromLamps = true;
         truths = std::move(lamps);
       }
     m_fromLamps = fromLamps;
-    for (const std::vector<Rgb>& frame : truths)
-      m_error.addTruth(frame);
+    for (const Truth& frame : truths)
+      m_error.addTruth(frame.beauty);
+  }
+
+  bool areFarQuieter(const std::array<Truth, 2>& lamps, const std::array<Truth, 2>& eye) const {
+    if (std::min(lamps[0].joined, lamps[1].joined) < kFewestJoined) return false;
+    const auto noise =
+        blockNoise({&eye[0].beauty, &eye[1].beauty}, {&lamps[0].beauty, &lamps[1].beauty},
+                   m_crop.max.x - m_crop.min.x);
+    return noise && (*noise)[1] < kFarQuieter * (*noise)[0];
   }
 
   // Of another seed than the batches': its bits turned over.
-  std::vector<Rgb> truth(int index, bool fromLamps) const {
+  Truth truth(int index, bool fromLamps) const {
     return m_renderer->truth(RandomKey::fromSeed(~seed(), index), fromLamps);
   }
 
@@ -249,7 +259,7 @@ class FrameLoop {
     if (tooFew()) return late;
     if (!(m_target > 0)) return true;
     const ErrorEstimate e = m_estimate = m_error.estimate();
-    if (late || met(e)) return true;
+    if (late || met(e) || !std::isfinite(e.bound())) return true;
     // Photons do not mend a bias that is beyond doubt.
     const double sure = e.bias * e.bias - 2 * e.doubt * e.doubt;
     return (sure >= m_target * m_target && e.noise < 0.5 * e.bias) || settled(e);

@@ -30,12 +30,12 @@ std::vector<Rgb> halved(const std::vector<Rgb>& values, int width) {
   for (int y = 0; y < rows; ++y)
     for (int x = 0; x < columns; ++x) {
       const int right = std::min(2 * x + 2, width), bottom = std::min(2 * y + 2, height);
-      Rgb sum(0.0f);
+      const float share = 1.0f / static_cast<float>((right - 2 * x) * (bottom - 2 * y));
+      Rgb mean(0.0f);
       for (int v = 2 * y; v < bottom; ++v)
         for (int u = 2 * x; u < right; ++u)
-          sum += values[static_cast<std::size_t>(v * width + u)];
-      out[static_cast<std::size_t>(y * columns + x)] =
-          sum / static_cast<float>((right - 2 * x) * (bottom - 2 * y));
+          mean += share * values[static_cast<std::size_t>(v * width + u)];
+      out[static_cast<std::size_t>(y * columns + x)] = mean;
     }
   return out;
 }
@@ -67,19 +67,39 @@ std::size_t blockOf(std::size_t i, int width, int columns, std::size_t level) {
 
 }  // namespace
 
-double blockDifference(std::vector<Rgb> a, std::vector<Rgb> b, int width) {
-  constexpr int kHalvings = 3;
-  for (int i = 0; i < kHalvings; ++i, width = (width + 1) / 2) {
-    a = halved(a, width);
-    b = halved(b, width);
+std::optional<std::array<double, 2>> blockNoise(const FramePair& a, const FramePair& b, int width) {
+  constexpr int kMostHalvings = 3;
+  constexpr std::size_t kFewest = 16;  // blocks
+  std::vector<Rgb> frames[] = {*a[0], *a[1], *b[0], *b[1]};
+  for (int i = 0; i < kMostHalvings; ++i) {
+    std::vector<Rgb> coarser = halved(frames[0], width);
+    if (coarser.size() < kFewest) break;
+    frames[0] = std::move(coarser);
+    for (int k = 1; k < 4; ++k)
+      frames[k] = halved(frames[k], width);
+    width = (width + 1) / 2;
   }
+  const std::size_t blocks = frames[0].size();
+  if (blocks < kFewest) return std::nullopt;
+  const auto value = [&](int frame, std::size_t i) {
+    return static_cast<double>(meanComponent(frames[frame][i]));
+  };
+  const auto sumOfAll = [&](std::size_t i) {
+    return value(0, i) + value(1, i) + value(2, i) + value(3, i);
+  };
   double mean = 0;
-  for (std::size_t i = 0; i < a.size(); ++i)
-    mean += static_cast<double>(meanComponent(a[i] + b[i])) / static_cast<double>(a.size());
-  double sum = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    const double scale = static_cast<double>(meanComponent(a[i] + b[i])) + mean;
-    if (scale > 0) sum += square(static_cast<double>(meanComponent(a[i] - b[i])) / scale);
+  for (std::size_t i = 0; i < blocks; ++i)
+    mean += sumOfAll(i) / static_cast<double>(blocks);
+  std::array<double, 2> sum{};
+  for (std::size_t i = 0; i < blocks; ++i) {
+    const double scale = square(sumOfAll(i) + mean);
+    if (!(scale > 0)) continue;
+    const double own[] = {square(value(0, i) - value(1, i)), square(value(2, i) - value(3, i))};
+    // Of means of two, each with a quarter of `own` as its variance; beyond two standard errors.
+    const double apart = 0.5 * (value(0, i) + value(1, i) - value(2, i) - value(3, i));
+    const double missed = std::max(0.0, square(apart) - own[0] - own[1]);
+    for (const std::size_t which : {0u, 1u})
+      sum[which] += (own[which] + ((apart < 0) == (which == 0) ? 4 * missed : 0.0)) / scale;
   }
   return sum;
 }
@@ -118,8 +138,21 @@ Vec3d FrameError::Pyramid::varianceOfMean(std::size_t level, std::size_t i) cons
   return Vec3d(levels[level].squares[i]) / (count * (count - 1.0));
 }
 
+std::vector<Rgb> FrameError::inUnits(std::vector<Rgb> frame) {
+  if (m_unit == 0) {
+    float most = 0;
+    for (const Rgb& value : frame)
+      most = std::max(most, maxComponent(glm::abs(value)));
+    if (!(most > 0) || !std::isfinite(most)) return frame;
+    m_unit = std::exp2(std::ilogb(static_cast<double>(most)));
+  }
+  for (Rgb& value : frame)
+    value = Rgb(Vec3d(value) / m_unit);
+  return frame;
+}
+
 void FrameError::add(const std::vector<Rgb>& frame) {
-  m_frames[static_cast<std::size_t>(batches() % 2)].add(frame, m_width);
+  m_frames[static_cast<std::size_t>(batches() % 2)].add(inUnits(frame), m_width);
 }
 
 void FrameError::add(const std::vector<Rgb>& frame, const std::vector<Rgb>& wider,
@@ -128,11 +161,11 @@ void FrameError::add(const std::vector<Rgb>& frame, const std::vector<Rgb>& wide
   std::vector<Rgb> values(frame.size());
   for (std::size_t i = 0; i < values.size(); ++i)
     values[i] = (wider[i] - frame[i]) / static_cast<float>(widening - 1.0);
-  m_wider.add(std::move(values), m_width);
+  m_wider.add(inUnits(std::move(values)), m_width);
 }
 
 void FrameError::addTruth(const std::vector<Rgb>& frame) {
-  m_truths.add(frame, m_width);
+  m_truths.add(inUnits(frame), m_width);
 }
 
 // Both turns of batches as one (Chan et al. 1979).
@@ -320,11 +353,12 @@ std::vector<Rgb> FrameError::standardError() const {
   const Pyramid frames = allFrames();
   std::vector<Rgb> out(frames.count > 0 ? frames.levels[0].mean.size() : 0);
   for (std::size_t i = 0; i < out.size(); ++i)
-    out[i] = Rgb(glm::sqrt(frames.varianceOfMean(0, i)));
+    out[i] = Rgb(m_unit * glm::sqrt(frames.varianceOfMean(0, i)));
   return out;
 }
 
 void FrameError::keep(StateWriter& w) const {
+  w.value(m_unit);
   for (const Pyramid* pyramid : {&m_frames[0], &m_frames[1], &m_wider, &m_truths}) {
     w.value(pyramid->count);
     w.value(static_cast<std::uint64_t>(pyramid->levels.size()));
@@ -337,6 +371,7 @@ void FrameError::keep(StateWriter& w) const {
 }
 
 void FrameError::resume(StateReader& r) {
+  r.value(m_unit);
   for (Pyramid* pyramid : {&m_frames[0], &m_frames[1], &m_wider, &m_truths}) {
     r.value(pyramid->count);
     const auto levels = r.value<std::uint64_t>();

@@ -95,14 +95,14 @@ render::FrameLayers LayerRenderer::render(const estimators::InscatterSource* sou
   return render(source, pass, std::move(options));
 }
 
-std::vector<Rgb> LayerRenderer::lightPaths(render::LightPathOptions options,
-                                           transport::TraceStatistics& traced) const {
+render::LightPaths LayerRenderer::lightPaths(render::LightPathOptions options) const {
   options.filter = m_options.filter;
   options.filterWidth = m_options.filterWidth;
   options.crop = m_options.crop;
   options.space = m_options.space;
   options.lens = m_options.lens;
-  return render::traceLightPaths(*m_setup.camera, *m_setup.medium, m_setup.lights, options, traced);
+  options.maxScatter = m_path.maxScatter;
+  return render::traceLightPaths(*m_setup.camera, *m_setup.medium, m_setup.lights, options);
 }
 
 std::vector<Rgb> LayerRenderer::lightPaths(Checkpoint* checkpoint, std::uint64_t part,
@@ -114,11 +114,12 @@ std::vector<Rgb> LayerRenderer::lightPaths(Checkpoint* checkpoint, std::uint64_t
   options.guide = m_setup.guide.get();
   options.checkpoint = checkpoint;
   options.part = part;
-  transport::TraceStatistics traced;
-  std::vector<Rgb> multiple = lightPaths(options, traced);
-  addTraced(traced, statistics);
+  render::LightPaths paths = lightPaths(options);
+  addTraced(paths.traced, statistics);
+  statistics.pathsCapped += paths.capped;
+  statistics.pathsCappedRadiance += paths.cappedShare;
   statistics.seconds.trace += watch.seconds();
-  return multiple;
+  return std::move(paths.multiple);
 }
 
 render::FrameLayers LayerRenderer::renderCrop(const estimators::InscatterSource* source, int pass,
@@ -141,7 +142,7 @@ render::FrameLayers LayerRenderer::render(const estimators::InscatterSource* sou
   return layers;
 }
 
-std::vector<Rgb> LayerRenderer::truth(RandomKey key, bool fromLamps) const {
+Truth LayerRenderer::truth(RandomKey key, bool fromLamps) const {
   render::FrameOptions options = m_options;
   const Vec2i size = options.crop.max - options.crop.min;
   const std::int64_t pixels = std::max<std::int64_t>(1, std::int64_t{size.x} * size.y);
@@ -151,15 +152,18 @@ std::vector<Rgb> LayerRenderer::truth(RandomKey key, bool fromLamps) const {
   if (fromLamps) path.effects.multipleScattering = false;
   const auto integrator = render::makePathIntegrator(*m_setup.medium, m_setup.lights, path);
   render::FrameLayers layers = render::renderFrame(*m_setup.camera, *integrator, options);
+  Truth truth;
   if (fromLamps) {
     render::LightPathOptions paths;
     paths.photons = static_cast<std::uint64_t>(options.samples * pixels);
     paths.key = key;
-    transport::TraceStatistics traced;
-    render::setMultiple(layers, lightPaths(paths, traced));
+    render::LightPaths lamps = lightPaths(paths);
+    truth.joined = lamps.joined;
+    render::setMultiple(layers, std::move(lamps.multiple));
   }
   dropLayers(m_setup.effects, layers);
-  return std::move(layers.beauty);
+  truth.beauty = std::move(layers.beauty);
+  return truth;
 }
 
 double LayerRenderer::rays(const render::Crop& crop) const {

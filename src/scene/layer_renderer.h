@@ -14,6 +14,12 @@ namespace photosphere::scene {
 /// True when estimator.samples says how many rays there are, rather than render.samples.
 bool sendsPaths(const SceneFile& scene);
 
+/// A frame without a bias.
+struct Truth {
+  std::vector<Rgb> beauty;
+  std::uint64_t joined = 0;  ///< collisions of photons that are in it; 0 where none were sent
+};
+
 /// For one pass of a frame or several. Holds references to what it is made of.
 class LayerRenderer {
  public:
@@ -32,17 +38,16 @@ class LayerRenderer {
   /// A part of the frame.
   render::FrameLayers renderCrop(const estimators::InscatterSource* source, int pass,
                                  const render::Crop& crop) const;
-  /// `beauty` without a bias, from a few paths a pixel and random numbers of its own.
+  /// From a few paths a pixel and random numbers of its own.
   /// @param fromLamps  what scatters more than once by as many paths from the lamps
-  std::vector<Rgb> truth(RandomKey key, bool fromLamps) const;
+  Truth truth(RandomKey key, bool fromLamps) const;
   /// Rays of one pass over a crop, those of the filter's border too.
   double rays(const render::Crop& crop) const;
   /// Of shadow grids.
   std::uint64_t memoryBytes() const { return m_shadows ? m_shadows->memoryBytes() : 0; }
 
  private:
-  std::vector<Rgb> lightPaths(render::LightPathOptions options,
-                              transport::TraceStatistics& traced) const;
+  render::LightPaths lightPaths(render::LightPathOptions options) const;
   render::FrameLayers render(const estimators::InscatterSource* source, int pass,
                              render::FrameOptions options) const;
 

@@ -68,8 +68,8 @@ void finish(const FrameSetup& setup, double cpuBefore, FrameResult& result) {
   s.nanSamples = layers.nanSamples;
   s.negativeSamples = layers.negativeSamples;
   s.majorantViolations += layers.counters.tracking.majorantViolations;
-  s.pathsCapped = layers.counters.capped;
-  s.pathsCappedRadiance = layers.counters.cappedRadiance;
+  s.pathsCapped += layers.counters.capped;
+  s.pathsCappedRadiance += layers.counters.cappedRadiance;
   if (s.pathsCapped > 0)
     result.notes.push_back(
         fmt::format("estimator.max_scatter ended {} paths, which lose {:.4g} of "

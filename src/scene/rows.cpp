@@ -333,7 +333,8 @@ std::span<const Param> estimatorParams() {
        .type = ParamType::integer,
        .unit = "",
        .defaultText = "0",
-       .help = "path_traced: events a path at most, what is lost is reported; 0 = no cap",
+       .help = "path_traced, light_traced: events a path at most, what is lost is reported; 0 = no "
+               "cap",
        .min = 0,
        .max = 2e9},
   };

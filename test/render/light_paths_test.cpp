@@ -20,25 +20,42 @@ render::Crop whole(const cameras::Camera& camera) {
   return {Vec2i(0), camera.resolution()};
 }
 
+// What both ways must take alike.
+struct Picture {
+  render::Lens lens{};
+  lights::LocalSpace space{};
+  render::FilterKind filter = render::FilterKind::blackmanHarris;
+  double filterWidth = 0;
+  int maxScatter = 0;
+};
+
 std::vector<Rgb> lightPaths(const TestScene& scene, std::uint64_t photons, std::uint64_t seed,
-                            const render::Lens& lens = {}) {
+                            const Picture& picture = {}) {
   render::LightPathOptions options;
   options.photons = photons;
   options.key = RandomKey::fromSeed(seed, 0);
   options.crop = whole(*scene.camera);
-  options.lens = lens;
-  transport::TraceStatistics statistics;
-  return render::traceLightPaths(*scene.camera, *scene.medium, scene.lights, options, statistics);
+  options.lens = picture.lens;
+  options.space = picture.space;
+  options.filter = picture.filter;
+  options.filterWidth = picture.filterWidth;
+  options.maxScatter = picture.maxScatter;
+  return render::traceLightPaths(*scene.camera, *scene.medium, scene.lights, options).multiple;
 }
 
 std::vector<Rgb> eyePaths(const TestScene& scene, int samples, std::uint64_t seed,
-                          const render::Lens& lens = {}) {
-  const auto path = render::makePathIntegrator(*scene.medium, scene.lights, {});
+                          const Picture& picture = {}) {
+  render::PathOptions way;
+  way.maxScatter = picture.maxScatter;
+  const auto path = render::makePathIntegrator(*scene.medium, scene.lights, way);
   render::FrameOptions options;
   options.samples = samples;
   options.key = RandomKey::fromSeed(seed, 0);
   options.crop = whole(*scene.camera);
-  options.lens = lens;
+  options.lens = picture.lens;
+  options.space = picture.space;
+  options.filter = picture.filter;
+  options.filterWidth = picture.filterWidth;
   return render::renderFrame(*scene.camera, *path, options).multiple;
 }
 
@@ -74,14 +91,14 @@ Blocks blocksOf(const cameras::Camera& camera, int edge, int seeds, int channel,
 
 // Both ways agree in every block, and in the mean to `close`.
 void expectAgreement(const TestScene& scene, std::uint64_t photons, int samples, double close,
-                     const render::Lens& lens = {}, int channel = 1) {
+                     const Picture& picture = {}, int channel = 1) {
   constexpr int kSeeds = 8, kEdge = 8;
   const cameras::Camera& camera = *scene.camera;
   const Blocks ours = blocksOf(camera, kEdge, kSeeds, channel, [&](std::uint64_t seed) {
-    return lightPaths(scene, photons, seed, lens);
+    return lightPaths(scene, photons, seed, picture);
   });
   const Blocks theirs = blocksOf(camera, kEdge, kSeeds, channel, [&](std::uint64_t seed) {
-    return eyePaths(scene, samples, 100 + seed, lens);
+    return eyePaths(scene, samples, 100 + seed, picture);
   });
   double a = 0, b = 0, noise = 0;
   for (std::size_t i = 0; i < ours.mean.size(); ++i) {
@@ -172,7 +189,119 @@ TEST(LightPaths, CarryTheLightOfGlowingSmoke) {
 }
 
 TEST(LightPaths, AgreeThroughALens) {
-  expectAgreement(coneOfSmoke(0.2), photons(0.15), paths(150), kClose, {0.25, 2.4});
+  expectAgreement(coneOfSmoke(0.2), photons(0.15), paths(150), kClose, {.lens = {0.25, 2.4}});
+}
+
+// As much light falls through every filter, on pixels of its own.
+TEST(LightPaths, AgreeThroughEveryFilter) {
+  for (const auto& [filter, width] :
+       {std::pair{render::FilterKind::box, 0.0}, std::pair{render::FilterKind::box, 2.5},
+        std::pair{render::FilterKind::triangle, 0.0},
+        std::pair{render::FilterKind::blackmanHarris, 5.0}})
+    expectAgreement(coneOfSmoke(0.2), photons(0.15), paths(150), kClose,
+                    {.filter = filter, .filterWidth = width});
+}
+
+// A scene in centimetres, far from its origin.
+TEST(LightPaths, AgreeWhereAUnitIsNoMetre) {
+  TestScene scene = coneOfSmoke(0.2);
+  Picture picture;
+  picture.space = {{4000, -2000, 70}, 0.01};
+  scene.camera = cameraOf("perspective",
+                          cameras::lookAt(picture.space.worldFromLocal({0, -3, 0.4}),
+                                          picture.space.worldFromLocal(Vec3d(0.0)), {0, 0, 1}),
+                          {32, 32}, {{"fov", "22"}});
+  expectAgreement(scene, photons(0.15), paths(150), kClose, picture);
+}
+
+TEST(LightPaths, AgreeInVolumesOfDifferentPhase) {
+  TestScene scene = coneOfSmoke(0.0);
+  std::vector<transport::MediumVolume> volumes;
+  for (const double x : {-0.15, 0.15})
+    volumes.push_back(sampledVolume(1.0, 24, {0.9, x < 0 ? -0.5 : 0.8, 8.0}, [&](const Vec3d& p) {
+      return std::max(0.0, 1 - 3 * glm::length(p - Vec3d(x, 0.0, 0.0)));
+    }));
+  scene.medium = std::make_unique<transport::Medium>(std::move(volumes));
+  expectAgreement(scene, photons(0.15), paths(200), 2 * kClose);
+}
+
+TEST(LightPaths, AgreeWhereScatteringsAreCapped) {
+  for (const int cap : {2, 4})
+    expectAgreement(coneOfSmoke(0.2), photons(0.15), paths(150), kClose, {.maxScatter = cap});
+  const TestScene scene = coneOfSmoke(0.2);
+  render::LightPathOptions options;
+  options.photons = 20'000;
+  options.crop = whole(*scene.camera);
+  options.maxScatter = 2;
+  const render::LightPaths capped =
+      render::traceLightPaths(*scene.camera, *scene.medium, scene.lights, options);
+  EXPECT_GT(capped.capped, 1000u);
+  EXPECT_GT(capped.cappedShare, 0.05 * 20'000);
+  EXPECT_LT(capped.cappedShare, 20'000);
+}
+
+// Smoke whose middle a wide camera sees all but across its axis, where a pixel covers next to
+// nothing.
+TEST(LightPaths, AgreeWhereTheMiddleOfTheSmokeIsFarOffTheAxis) {
+  TestScene scene = coneOfSmoke(0.2);
+  scene.camera = cameraOf("perspective", cameras::lookAt({0, -0.75, 0}, {1, -0.7501, 0}, {0, 0, 1}),
+                          {32, 32}, {{"fov", "120"}});
+  const auto sum = [](const std::vector<Rgb>& frame) {
+    double all = 0;
+    for (const Rgb& pixel : frame)
+      all += static_cast<double>(pixel.y);
+    return all;
+  };
+  const double expected = sum(eyePaths(scene, paths(2000), 1));
+  ASSERT_GT(expected, 0.0);
+  EXPECT_NEAR(sum(lightPaths(scene, photons(1), 2)) / expected, 1.0, kSanitized ? 0.3 : 0.1);
+}
+
+// Lamps as bright as a float can say are no brighter than a pixel can hold.
+TEST(LightPaths, ScaleWithTheirLamps) {
+  TestScene scene = coneOfSmoke(0.2);
+  const std::vector<Rgb> dim = lightPaths(scene, 20'000, 3);
+  scene.lights.clear();
+  scene.lights.push_back(makeLight("spot", {{"position", "[2, -1, 2]"},
+                                            {"target", "[0, 0, 0.1]"},
+                                            {"intensity", "3e31"},
+                                            {"cone_angle", "8"},
+                                            {"cone_edge", "2"}}));
+  const std::vector<Rgb> bright = lightPaths(scene, 20'000, 3);
+  double most = 0;
+  for (std::size_t i = 0; i < dim.size(); ++i) {
+    EXPECT_NEAR(static_cast<double>(bright[i].x) / 1e30, static_cast<double>(dim[i].x),
+                1e-4 * static_cast<double>(dim[i].x) + 1e-6);
+    most = std::max(most, static_cast<double>(dim[i].x));
+  }
+  EXPECT_GT(most, 0.01);
+}
+
+TEST(LightPaths, GoOnFromACheckpointToTheSameBits) {
+  const TestScene scene = coneOfSmoke(0.3);
+  const TemporaryFolder folder;
+  render::LightPathOptions options;
+  options.photons = photons(1);
+  options.key = RandomKey::fromSeed(5, 0);
+  options.crop = whole(*scene.camera);
+  options.maxScatter = 20;
+  const auto trace = [&] {
+    return render::traceLightPaths(*scene.camera, *scene.medium, scene.lights, options);
+  };
+  const render::LightPaths expected = trace();
+  for (int run = 0; run < 2; ++run) {
+    Checkpoint checkpoint(folder / "work.checkpoint", 0.0, Resume::automatic);
+    checkpoint.identify("the same");
+    if (run > 0) {
+      EXPECT_TRUE(checkpoint.load("light"));
+    }
+    options.checkpoint = &checkpoint;
+    const render::LightPaths paths = trace();
+    EXPECT_EQ(paths.multiple, expected.multiple) << run;
+    EXPECT_EQ(paths.joined, expected.joined) << run;
+    EXPECT_EQ(paths.capped, expected.capped) << run;
+    EXPECT_NEAR(paths.cappedShare, expected.cappedShare, 1e-9 * expected.cappedShare) << run;
+  }
 }
 
 // Smoke that only scatters looks like the even surroundings that it stands in.
@@ -209,9 +338,8 @@ TEST(LightPaths, AreTheSameBitsForAnyNumberOfThreadsAndCrop) {
   options.photons = 20'000;
   options.key = RandomKey::fromSeed(5, 0);
   options.crop = {{7, 9}, {20, 30}};
-  transport::TraceStatistics statistics;
   const std::vector<Rgb> part =
-      render::traceLightPaths(*scene.camera, *scene.medium, scene.lights, options, statistics);
+      render::traceLightPaths(*scene.camera, *scene.medium, scene.lights, options).multiple;
   for (int y = 9; y < 30; ++y)
     for (int x = 7; x < 20; ++x)
       EXPECT_EQ(part[static_cast<std::size_t>((y - 9) * 13 + x - 7)],

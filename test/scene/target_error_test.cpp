@@ -34,15 +34,15 @@ struct MadeUp {
 
 // `smooth` scales the frame as a whole and no kernel tells it; `fine` changes sign from pixel to
 // pixel and grows with the kernel.
-MadeUp madeUp(float smooth, float fine, int batches, int truths) {
+MadeUp madeUp(float smooth, float fine, int batches, int truths, float scale = 1.0f) {
   MadeUp m;
   Rng rng(RandomKey::fromSeed(21, 0), RandomStream::test, 0);
   const auto noise = [&](float size) {
-    return size * (Rgb(rng.uniform(), rng.uniform(), rng.uniform()) - 0.5f);
+    return scale * size * (Rgb(rng.uniform(), rng.uniform(), rng.uniform()) - 0.5f);
   };
   for (int i = 0; i < 4000; ++i) {
     const float x = static_cast<float>(i % 80) / 80, y = static_cast<float>(i) / 4000;
-    const Rgb t(0.3f + x, 0.5f + y, 3.0f * x * y);
+    const Rgb t = scale * Rgb(0.3f + x, 0.5f + y, 3.0f * x * y);
     m.truth.push_back(t);
     m.biased.push_back((1.0f + smooth + (i % 2 ? fine : -fine)) * t);
   }
@@ -111,6 +111,60 @@ TEST(FrameErrorTest, SaysNothingOfNothing) {
   for (int b = 0; b < 8; ++b)
     error.add(std::vector<Rgb>(4, Rgb(0.0f)));
   EXPECT_EQ(error.estimate().total(), 0.0);  // black is exactly black
+}
+
+// Radiances whose squares no float holds, of a sun or of a dim ember.
+TEST(FrameErrorTest, AreRelativeWhateverTheRadiance) {
+  const ErrorEstimate expected = madeUp(0.1f, 0.08f, 8, 20).error.estimate();
+  for (const float scale : {1e30f, 1e-30f}) {
+    const MadeUp m = madeUp(0.1f, 0.08f, 8, 20, scale);
+    const ErrorEstimate e = m.error.estimate();
+    EXPECT_NEAR(e.noise / expected.noise, 1.0, 1e-3) << scale;
+    EXPECT_NEAR(e.bias / expected.bias, 1.0, 1e-2) << scale;
+    EXPECT_NEAR(e.doubt / expected.doubt, 1.0, 1e-2) << scale;
+    double deviation = 0;
+    for (const Rgb& s : m.error.standardError())
+      deviation += static_cast<double>(s.x) / static_cast<double>(scale) / 4000;
+    EXPECT_NEAR(deviation, 0.3 / std::sqrt(12.0 * 8), 0.002) << scale;
+  }
+}
+
+using Frame = std::vector<Rgb>;
+
+Frame evenFrame(int pixels, float value, float noise, std::uint64_t seed) {
+  Frame frame;
+  Rng rng(RandomKey::fromSeed(seed, 0), RandomStream::test, 0);
+  for (int i = 0; i < pixels; ++i)
+    frame.emplace_back(value + noise * (rng.uniform() - 0.5f));
+  return frame;
+}
+
+TEST(BlockNoise, IsThatOfTheFrames) {
+  const Frame a[] = {evenFrame(4096, 1, 0.5f, 1), evenFrame(4096, 1, 0.5f, 2)};
+  const Frame b[] = {evenFrame(4096, 1, 0.05f, 3), evenFrame(4096, 1, 0.05f, 4)};
+  const auto noise = blockNoise({&a[0], &a[1]}, {&b[0], &b[1]}, 64);
+  ASSERT_TRUE(noise);
+  // By chance the other pair seems to miss some.
+  EXPECT_GT((*noise)[1] / (*noise)[0], 0.005);
+  EXPECT_LT((*noise)[1] / (*noise)[0], 0.2);
+}
+
+// Paths from the lamps that have met no pixel agree with each other to the bit.
+TEST(BlockNoise, BlackFramesAreNotQuiet) {
+  const Frame a[] = {evenFrame(4096, 1, 0.5f, 1), evenFrame(4096, 1, 0.5f, 2)};
+  const Frame black(4096, Rgb(0.0f));
+  const auto noise = blockNoise({&a[0], &a[1]}, {&black, &black}, 64);
+  ASSERT_TRUE(noise);
+  EXPECT_GT((*noise)[1], 10 * (*noise)[0]);
+  const auto turned = blockNoise({&black, &black}, {&a[0], &a[1]}, 64);
+  EXPECT_GT((*turned)[0], 10 * (*turned)[1]);
+}
+
+TEST(BlockNoise, IsOfSmallerBlocksInSmallFramesAndOfNoneInTiny) {
+  const Frame a = evenFrame(64, 1, 0.5f, 1), b = evenFrame(64, 1, 0.5f, 2);
+  EXPECT_TRUE(blockNoise({&a, &b}, {&b, &a}, 8));
+  const Frame c = evenFrame(9, 1, 0.5f, 1);
+  EXPECT_FALSE(blockNoise({&c, &c}, {&c, &c}, 3));
 }
 
 class TargetError : public ::testing::Test {

@@ -20,21 +20,29 @@ struct LightPathOptions {
   Crop crop;
   lights::LocalSpace space;  ///< the camera is in world space
   Lens lens;                 ///< of a perspective camera
+  int maxScatter = 0;        ///< scatterings at most, that toward the eye too; 0 = no cap
   Checkpoint* checkpoint = nullptr;
   std::uint64_t part = 0;  ///< tells the traces of a frame apart in its checkpoint
 };
 
-/// Light scattered twice or more (once or more where the smoke gave it off), over the crop, row by
-/// row [W m^-2 sr^-1]. Every collision of a photon is joined to the eye: power times phase times
-/// ratio-tracked transmittance, on the part of the picture where the camera sees that place
-/// (Dutre et al. 1993, "Monte Carlo light tracing with direct computation of pixel intensities";
-/// cameras::Projection), through the pixel filter. Unbiased; its variance is not bounded where the
-/// eye is inside the smoke. The same bits for any number of threads.
+struct LightPaths {
+  /// Light scattered twice or more (once or more where the smoke gave it off), over the crop, row
+  /// by row [W m^-2 sr^-1].
+  std::vector<Rgb> multiple;
+  std::uint64_t joined = 0;  ///< collisions that brought light to the crop
+  std::uint64_t capped = 0;  ///< photons that scattered on after maxScatter
+  double cappedShare = 0.0;  ///< of the power of all photons [1], summed over these photons
+  transport::TraceStatistics traced;
+};
+
+/// Every collision of a photon is joined to the eye: power times phase times ratio-tracked
+/// transmittance, on the part of the picture where the camera sees that place (Dutre et al. 1993,
+/// "Monte Carlo light tracing with direct computation of pixel intensities"; cameras::Projection),
+/// through the pixel filter. Unbiased; its variance is not bounded where the eye is inside the
+/// smoke. The same bits for any number of threads.
 /// @param medium  that does not move
 /// @throws InterruptedError; Error when a pixel leaves the range of its 64-bit sum
-std::vector<Rgb> traceLightPaths(const cameras::Camera& camera, const transport::Medium& medium,
-                                 const transport::LightList& lights,
-                                 const LightPathOptions& options,
-                                 transport::TraceStatistics& statistics);
+LightPaths traceLightPaths(const cameras::Camera& camera, const transport::Medium& medium,
+                           const transport::LightList& lights, const LightPathOptions& options);
 
 }  // namespace photosphere::render

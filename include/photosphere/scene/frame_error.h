@@ -2,6 +2,7 @@
 // How far a frame is from the truth, estimated from independent batches of it.
 
 #include <array>
+#include <optional>
 #include <vector>
 
 #include "photosphere/core/checkpoint.h"
@@ -22,10 +23,16 @@ struct ErrorEstimate {
   double bound() const;
 };
 
-/// How far two frames differ in the means of 8 x 8 pixels, as a relative squared difference of
-/// these beside the frame's own mean, summed over blocks.
-/// @param width  of both [pixels]
-double blockDifference(std::vector<Rgb> a, std::vector<Rgb> b, int width);
+/// Two independent frames of one kind.
+using FramePair = std::array<const std::vector<Rgb>*, 2>;
+
+/// How noisy two ways are to the same frame, from a pair of each: the squared difference of the two
+/// in the means of blocks of at most 8 x 8 pixels, relative to these beside the frame's own mean,
+/// summed over blocks. Where rare bright paths have met neither frame of a pair it looks quiet, so
+/// that by which the ways differ beyond their own differences is the darker one's.
+/// @param width  of all [pixels]
+/// @return nothing for a frame of so few pixels that chance would tell
+std::optional<std::array<double, 2>> blockNoise(const FramePair& a, const FramePair& b, int width);
 
 /// Adds up batches of one frame. Photon noise is shared by neighbouring pixels and samples, so only
 /// whole batches with photons of their own tell it.
@@ -71,6 +78,7 @@ class FrameError {
   };
   struct Scale;
 
+  std::vector<Rgb> inUnits(std::vector<Rgb> frame);
   Pyramid allFrames() const;
   double noiseByHalves() const;
   Scale scaleBy(const Pyramid& frames, std::size_t level) const;
@@ -82,6 +90,9 @@ class FrameError {
              double& standardError) const;
 
   int m_width;
+  // Radiance of about the first frame's brightest pixel [W m^-2 sr^-1], a power of two, in which
+  // all is kept: squares of radiances leave a float's range long before these do. 0 = all is black.
+  double m_unit = 0;
   std::array<Pyramid, 2> m_frames;  // batches in turn
   Pyramid m_wider, m_truths;
 };

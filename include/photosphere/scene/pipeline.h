@@ -49,7 +49,7 @@ struct FrameStatistics {
       energyCapped{0.0}, energyError{0.0};
   std::uint64_t nanSamples = 0, negativeSamples = 0, majorantViolations = 0;
   double clampedLight = 0;         ///< InscatterSource::clampedShare
-  std::uint64_t pathsCapped = 0;   ///< path_traced: ended by max_scatter
+  std::uint64_t pathsCapped = 0;   ///< ended by max_scatter, from either end
   double pathsCappedRadiance = 0;  ///< throughput they still carried, summed
   std::vector<EffectState> effects;
   std::optional<ErrorEstimate> error;  ///< where render.target_error or time_limit asks for it
