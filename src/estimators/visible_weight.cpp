@@ -31,27 +31,20 @@ float VisibleWeight::wayOut(std::size_t voxel, const Vec3f& p, const Vec3f& d) c
   return transport::exitDistance(-half, half, p - m_lattice.center(voxel), d);
 }
 
-float VisibleWeight::beyond(const Vec3f& p, const Vec3f& d) const {
-  const double most = 2 * m_lattice.edge();
-  if (!m_view.hasEye) return static_cast<float>(most);
-  return static_cast<float>(std::clamp(glm::dot(m_view.eye - Vec3d(p), Vec3d(d)), 0.0, most));
+float VisibleWeight::wayToEye(const Vec3f& p, const Vec3f& d) const {
+  if (!m_view.hasEye) return kInfinity;
+  return static_cast<float>(std::max(0.0, glm::dot(m_view.eye - Vec3d(p), Vec3d(d))));
 }
 
 float VisibleWeight::at(std::size_t voxel, const Vec3f& p) const {
   const float sigma = m_medium.extinction(p);
   if (!(sigma > 0.0f)) return 0.0f;
   const Vec3f d = m_view.toEye(p);
-  float length = wayOut(voxel, p, d);
-  length += beyond(p + d * length, d);
-  if (m_view.hasEye)
-    length = std::min(length, static_cast<float>(glm::length(m_view.eye - Vec3d(p))));
-  const float hidden = depth(p, d, length);
+  const float hidden = depth(p, d, std::min(wayOut(voxel, p, d) + beyond(), wayToEye(p, d)));
   if (hidden >= kOpaque) return 0.0f;
   return sigma * static_cast<float>(m_lattice.edge()) * std::exp(-hidden);
 }
 
-// Hands on steps: where each begins, its length and optical depth, at most `stepDepth` in smoke
-// that thickens no faster than it can. Ends when `visit` returns false.
 template <class Visit>
 void VisibleWeight::walk(const Vec3f& p, const Vec3f& d, float length, float stepDepth,
                          const Visit& visit) const {
@@ -117,7 +110,7 @@ float VisibleWeight::meanFromAfar(std::size_t voxel) const {
       const float absorbed = share * -std::expm1(-depth(p - d * in, d, in));
       if (!(absorbed > 0.0f)) continue;
       open += absorbed;
-      const float hidden = depth(p, d, beyond(p, d));
+      const float hidden = depth(p, d, std::min(beyond(), wayToEye(p, d)));
       if (hidden < kOpaque) sum += std::exp(-hidden) * absorbed;
     }
   }
@@ -138,7 +131,7 @@ float VisibleWeight::meanNearby(std::size_t voxel) const {
     const Vec3f p =
         center + edge * ((cell + Vec3f(u, rng.uniform())) / static_cast<float>(kPoints) - 0.5f);
     const Vec3f d = m_view.toEye(p);
-    const auto away = static_cast<float>(glm::length(m_view.eye - Vec3d(p)));
+    const float away = wayToEye(p, d);
     const float forth = std::min(away, wayOut(voxel, p, d));
     const float nearest = away - forth;
     const float farthest = away + wayOut(voxel, p, -d);
@@ -154,7 +147,7 @@ float VisibleWeight::meanNearby(std::size_t voxel) const {
     if (!(seen > 0.0f) || !(whole > 0.0f)) continue;
     const float part = edge * seen / whole / static_cast<float>(kPoints * kPoints * kPoints);
     open += part;
-    const float hidden = depth(p + d * forth, d, std::min(nearest, beyond(p + d * forth, d)));
+    const float hidden = depth(p + d * forth, d, std::min(beyond(), nearest));
     if (hidden < kOpaque) sum += std::exp(-hidden) * part;
   }
   return sum < kHidden * open ? 0.0f : sum;

@@ -27,15 +27,20 @@ class VisibleWeight {
  private:
   // Way from `p` along `d` until it leaves the voxel [m].
   float wayOut(std::size_t voxel, const Vec3f& p, const Vec3f& d) const;
-  // Beyond a voxel, from a point of its surface along a direction to the eye or all but that.
-  float beyond(const Vec3f& p, const Vec3f& d) const;
+  // Beyond a voxel [m].
+  float beyond() const { return 2.0f * static_cast<float>(m_lattice.edge()); }
+  // Way from `p` to the eye along the direction to it, or all but that; endless without an eye [m].
+  float wayToEye(const Vec3f& p, const Vec3f& d) const;
   // Optical depth, summed up to where it is opaque.
   float depth(const Vec3f& p, const Vec3f& d, float length) const;
+  // Hands on steps along a line: where each begins, its length and its optical depth, at most
+  // `stepDepth` in smoke that thickens no faster than it can. Ends when `visit` returns false.
   template <class Visit>
   void walk(const Vec3f& p, const Vec3f& d, float length, float stepDepth,
             const Visit& visit) const;
+  // A voxel's own random numbers.
   Rng linesOf(std::size_t voxel) const;
-  // Of a voxel that the eye sees along parallel lines, or around it.
+  // Means of a voxel that lines to the eye pass all but parallel, and of one near the eye.
   float meanFromAfar(std::size_t voxel) const;
   float meanNearby(std::size_t voxel) const;
 
