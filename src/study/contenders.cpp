@@ -126,7 +126,7 @@ std::string formatCount(std::int64_t count) {
   return std::to_string(count);
 }
 
-std::vector<std::string> neutralEstimator(const scene::SceneFile& scene) {
+std::vector<std::string> neutralSettings(const scene::SceneFile& scene) {
   std::vector<std::string> sets;
   const ParamValues defaults(scene.estimator.rows());
   for (const Param& row : scene.estimator.rows())
@@ -199,7 +199,7 @@ std::vector<Contender> contenders(const SceneSource& scene, const SweepSize& siz
                                   const std::vector<std::string>& particleSets,
                                   std::vector<LeftOut>& leftOut) {
   checkNames(size);
-  const SceneSource neutral = scene.with(neutralEstimator(scene.open()));
+  const SceneSource neutral = scene.with(neutralSettings(scene.open()));
   std::vector<Contender> found;
   for (const Family& family : families()) {
     const bool wanted =
@@ -216,7 +216,7 @@ std::vector<Contender> contenders(const SceneSource& scene, const SweepSize& siz
         leftOut.push_back({std::string(family.title), why});
         break;
       }
-      const std::vector<std::string> reset = neutralEstimator(scene.open());
+      const std::vector<std::string> reset = neutralSettings(scene.open());
       c.sets.insert(c.sets.begin(), reset.begin(), reset.end());
       found.push_back(std::move(c));
     }

@@ -62,7 +62,7 @@ std::vector<Contender> contenders(const SceneSource& scene, const SweepSize& siz
 /// Overrides that take every key of [estimator] that the scene gives back to its default, and its
 /// target error and time limit away, so that contenders differ by their own settings alone and
 /// nothing ends a reference early.
-std::vector<std::string> neutralEstimator(const scene::SceneFile& scene);
+std::vector<std::string> neutralSettings(const scene::SceneFile& scene);
 
 /// "16k", "1.0M".
 std::string formatCount(std::int64_t count);

@@ -97,7 +97,7 @@ class FlickerMeter {
   ReferenceMaker referenceOf(std::int64_t frame) {
     const scene::SceneFile base = m_plan.scene.open();
     const SceneFacts facts = sceneFacts(base, frame);
-    return {m_plan.scene.with(neutralEstimator(base)),
+    return {m_plan.scene.with(neutralSettings(base)),
             frame,
             m_plan.referenceName,
             referenceKey(base, frame, facts.mediumHash),

@@ -69,7 +69,7 @@ Sweep::Sweep(SweepPlan plan) : m_plan(std::move(plan)) {
     scene::SceneFile scene = m_plan.scene.open(c.sets);
     m_entries.push_back({std::move(c), std::move(scene), {}, {}, false});
   }
-  m_reference.emplace(m_plan.scene.with(neutralEstimator(m_base)), m_plan.frame,
+  m_reference.emplace(m_plan.scene.with(neutralSettings(m_base)), m_plan.frame,
                       m_plan.referenceName, referenceKey(m_base, m_plan.frame, m_facts.mediumHash),
                       m_plan.cacheFolder, m_plan.chunk);
 }
