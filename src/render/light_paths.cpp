@@ -207,10 +207,24 @@ double quantumOf(double light, std::uint64_t photons) {
   return quantum > 0 && std::isfinite(quantum) ? quantum : 1.0;
 }
 
-// What all threads have joined to the eye.
-struct JoinCounts {
+// What some flights were counted as.
+struct FlightCounts {
+  transport::TrackingCounters tracking;
+  std::uint64_t joined = 0, capped = 0;
+  double cappedPower = 0.0;  // [W]
+};
+
+// The same from all threads.
+struct SharedCounts {
   std::atomic<std::uint64_t> joined{0}, majorantViolations{0}, capped{0};
   std::atomic<double> cappedPower{0.0};
+
+  void add(const FlightCounts& counts) {
+    joined += counts.joined;
+    majorantViolations += counts.tracking.majorantViolations;
+    capped += counts.capped;
+    cappedPower += counts.cappedPower;
+  }
 
   void keep(StateWriter& w) const {
     w.value(joined.load());
@@ -236,19 +250,19 @@ template <class Light>
 class EyeSink final : public transport::FlightSink {
  public:
   EyeSink(const Medium& medium, const Eye& eye, const LightPathOptions& options, Film& film,
-          JoinCounts& counts)
+          SharedCounts& counts)
       : m_medium(medium), m_eye(eye), m_options(options), m_film(film), m_counts(counts) {}
 
   void consume(std::span<const Flight> flights) override {
-    transport::TrackingCounters counters;
-    for (const Flight& flight : flights)
-      if (flight.collided() && isSought(flight)) {
-        if (isBeyondCap(flight))
-          count(flight);
-        else
-          join(flight, counters);
-      }
-    m_counts.majorantViolations += counters.majorantViolations;
+    FlightCounts counts;
+    for (const Flight& flight : flights) {
+      if (!flight.collided() || !isSought(flight)) continue;
+      if (isBeyondCap(flight))
+        count(flight, counts);
+      else
+        join(flight, counts);
+    }
+    m_counts.add(counts);
     // What is left of the trace would be for nothing.
     if (m_film.sums().overflows > 0) refuseBrightness();
   }
@@ -264,14 +278,14 @@ class EyeSink final : public transport::FlightSink {
            flight.scatterings >= static_cast<std::uint32_t>(m_options.maxScatter);
   }
 
-  // Once a photon.
-  void count(const Flight& flight) {
+  // Of the events that are left out only the first: what would come after it is not there.
+  void count(const Flight& flight, FlightCounts& counts) const {
     if (flight.scatterings > static_cast<std::uint32_t>(m_options.maxScatter)) return;
-    ++m_counts.capped;
-    m_counts.cappedPower += static_cast<double>(meanComponent(flight.power));
+    ++counts.capped;
+    counts.cappedPower += static_cast<double>(meanComponent(flight.power));
   }
 
-  void join(const Flight& flight, transport::TrackingCounters& counters) {
+  void join(const Flight& flight, FlightCounts& counts) {
     const Vec3f p = flight.origin + flight.direction * flight.length;
     Rng rng(m_options.key, RandomStream::connection,
             depositHash(m_options.key, flight.photon, flight.ordinal, ~0u));
@@ -282,10 +296,10 @@ class EyeSink final : public transport::FlightSink {
     if (!(maxComponent(scattered) > 0.0f)) return;
     const float inside = transport::exitDistance(m_medium, p, sight->direction);
     const Light passed = transport::trackTransmittance<Light>(
-        m_medium, p, sight->direction, std::min(sight->distance, inside), rng, counters);
+        m_medium, p, sight->direction, std::min(sight->distance, inside), rng, counts.tracking);
     const Vec3d value = Vec3d(scattered * passed) * sight->pixelsPerArea;
     if (!(std::max({value.x, value.y, value.z}) > 0)) return;
-    ++m_counts.joined;
+    ++counts.joined;
     m_film.add(sight->raster, value, flight);
   }
 
@@ -293,7 +307,7 @@ class EyeSink final : public transport::FlightSink {
   const Eye& m_eye;
   const LightPathOptions& m_options;
   Film& m_film;
-  JoinCounts& m_counts;
+  SharedCounts& m_counts;
 };
 
 }  // namespace
@@ -304,7 +318,7 @@ LightPaths traceLightPaths(const cameras::Camera& camera, const Medium& medium,
   const double light =
       typicalLight(camera, options.space, transport::boundingSphere(medium), power);
   Film film(camera, options, quantumOf(light, options.photons));
-  JoinCounts counts;
+  SharedCounts counts;
   const Eye eye(camera, options.space, options.lens);
   transport::TraceOptions trace;
   trace.photons = options.photons;

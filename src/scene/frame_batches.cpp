@@ -292,6 +292,12 @@ class FrameLoop {
     m_result.layerNames.emplace_back("error");
     if (!wanted || tooFew() || met(*s.error)) return;
     s.targetMissed = true;
+    if (!std::isfinite(s.error->bound())) {
+      m_setup.notes.push_back(
+          "the frame is brighter than a float can say, so its error cannot be told: lower the "
+          "lights' power");
+      return;
+    }
     m_setup.notes.push_back(fmt::format(
         "the estimated error {:.4g} (noise {:.4g}, bias {:.4g}, unsure by {:.4g}) misses "
         "render.target_error {:.4g}: {}",

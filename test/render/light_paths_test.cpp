@@ -264,44 +264,52 @@ TEST(LightPaths, ScaleWithTheirLamps) {
   scene.lights.clear();
   scene.lights.push_back(makeLight("spot", {{"position", "[2, -1, 2]"},
                                             {"target", "[0, 0, 0.1]"},
-                                            {"intensity", "3e31"},
+                                            {"intensity", "3e36"},
                                             {"cone_angle", "8"},
                                             {"cone_edge", "2"}}));
   const std::vector<Rgb> bright = lightPaths(scene, 20'000, 3);
   double most = 0;
   for (std::size_t i = 0; i < dim.size(); ++i) {
-    EXPECT_NEAR(static_cast<double>(bright[i].x) / 1e30, static_cast<double>(dim[i].x),
+    EXPECT_NEAR(static_cast<double>(bright[i].x) / 1e35, static_cast<double>(dim[i].x),
                 1e-4 * static_cast<double>(dim[i].x) + 1e-6);
     most = std::max(most, static_cast<double>(dim[i].x));
   }
   EXPECT_GT(most, 0.01);
 }
 
+// Photons and their sums' quantum are the same whatever the number of photons: what a few have left
+// is a part of what more leave.
 TEST(LightPaths, GoOnFromACheckpointToTheSameBits) {
   const TestScene scene = coneOfSmoke(0.3);
   const TemporaryFolder folder;
-  render::LightPathOptions options;
-  options.photons = photons(1);
-  options.key = RandomKey::fromSeed(5, 0);
-  options.crop = whole(*scene.camera);
-  options.maxScatter = 20;
-  const auto trace = [&] {
+  constexpr std::uint64_t kFew = 1 << 14;
+  const auto trace = [&](std::uint64_t photons, Checkpoint* checkpoint) {
+    render::LightPathOptions options;
+    options.photons = photons;
+    options.key = RandomKey::fromSeed(5, 0);
+    options.crop = whole(*scene.camera);
+    options.maxScatter = 20;
+    options.checkpoint = checkpoint;
     return render::traceLightPaths(*scene.camera, *scene.medium, scene.lights, options);
   };
-  const render::LightPaths expected = trace();
-  for (int run = 0; run < 2; ++run) {
+  const auto begin = [&] {
     Checkpoint checkpoint(folder / "work.checkpoint", 0.0, Resume::automatic);
     checkpoint.identify("the same");
-    if (run > 0) {
-      EXPECT_TRUE(checkpoint.load("light"));
-    }
-    options.checkpoint = &checkpoint;
-    const render::LightPaths paths = trace();
-    EXPECT_EQ(paths.multiple, expected.multiple) << run;
-    EXPECT_EQ(paths.joined, expected.joined) << run;
-    EXPECT_EQ(paths.capped, expected.capped) << run;
-    EXPECT_NEAR(paths.cappedShare, expected.cappedShare, 1e-9 * expected.cappedShare) << run;
-  }
+    return checkpoint;
+  };
+  const std::uint64_t many = 3 * kFew + photons(0.1);
+  const render::LightPaths expected = trace(many, nullptr);
+  Checkpoint first = begin();
+  const render::LightPaths few = trace(kFew, &first);
+  EXPECT_LT(few.joined, expected.joined / 2);
+  Checkpoint second = begin();
+  ASSERT_TRUE(second.load("light"));
+  const render::LightPaths paths = trace(many, &second);
+  EXPECT_EQ(paths.multiple, expected.multiple);
+  EXPECT_EQ(paths.joined, expected.joined);
+  EXPECT_EQ(paths.capped, expected.capped);
+  EXPECT_NEAR(paths.cappedShare, expected.cappedShare, 1e-9 * expected.cappedShare);
+  EXPECT_EQ(paths.traced.flights, expected.traced.flights);
 }
 
 // Smoke that only scatters looks like the even surroundings that it stands in.

@@ -30,8 +30,8 @@ struct LightPaths {
   /// by row [W m^-2 sr^-1].
   std::vector<Rgb> multiple;
   std::uint64_t joined = 0;  ///< collisions that brought light to the crop
-  std::uint64_t capped = 0;  ///< photons that scattered on after maxScatter
-  double cappedShare = 0.0;  ///< of the power of all photons [1], summed over these photons
+  std::uint64_t capped = 0;  ///< collisions of photons that have scattered maxScatter times
+  double cappedShare = 0.0;  ///< power of these photons, summed, over that of a whole one [1]
   transport::TraceStatistics traced;
 };
 
