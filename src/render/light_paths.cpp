@@ -239,12 +239,6 @@ struct SharedCounts {
   }
 };
 
-[[noreturn]] void refuseBrightness() {
-  throw Error(ExitCode::unspecified,
-              "photons were too bright for a pixel's 64-bit sum: the eye is all but where they "
-              "scatter; move it, or use estimator.type = \"path_traced\"");
-}
-
 // Joins every collision that is not a lamp's first to the eye.
 template <class Light>
 class EyeSink final : public transport::FlightSink {
@@ -254,6 +248,8 @@ class EyeSink final : public transport::FlightSink {
       : m_medium(medium), m_eye(eye), m_options(options), m_film(film), m_counts(counts) {}
 
   void consume(std::span<const Flight> flights) override {
+    // What is left of the trace would be for nothing; a sink must not throw.
+    if (m_film.sums().overflows > 0) return;
     FlightCounts counts;
     for (const Flight& flight : flights) {
       if (!flight.collided() || !isSought(flight)) continue;
@@ -263,8 +259,6 @@ class EyeSink final : public transport::FlightSink {
         join(flight, counts);
     }
     m_counts.add(counts);
-    // What is left of the trace would be for nothing.
-    if (m_film.sums().overflows > 0) refuseBrightness();
   }
 
  private:
@@ -327,10 +321,12 @@ LightPaths traceLightPaths(const cameras::Camera& camera, const Medium& medium,
   const transport::TraceKeeping keeping{options.checkpoint, options.part,
                                         [&](StateWriter& w) {
                                           counts.keep(w);
+                                          w.value(film.sums().overflows.load());
                                           w.value(film.sums().sums);
                                         },
                                         [&](StateReader& r) {
                                           counts.resume(r);
+                                          film.sums().overflows = r.value<std::uint64_t>();
                                           r.value(film.sums().sums);
                                           if (film.sums().sums.size() != 3 * film.pixels())
                                             r.fail();
@@ -349,6 +345,10 @@ LightPaths traceLightPaths(const cameras::Camera& camera, const Medium& medium,
   if (power > 0) paths.cappedShare = counts.cappedPower / power;
   paths.traced.majorantViolations += counts.majorantViolations;
   const FixedSums& sums = film.sums();
+  if (sums.overflows > 0)
+    throw Error(ExitCode::unspecified,
+                "photons were too bright for a pixel's 64-bit sum: the eye is all but where they "
+                "scatter; move it, or use estimator.type = \"path_traced\"");
   const double worth =
       sums.quantum / static_cast<double>(std::max<std::uint64_t>(1, trace.photons));
   paths.multiple.resize(film.pixels());

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 
+#include "photosphere/core/error.h"
 #include "photosphere/core/parallel.h"
 #include "photosphere/core/registry.h"
 #include "photosphere/render/light_paths.h"
@@ -257,9 +258,11 @@ TEST(LightPaths, AgreeWhereTheMiddleOfTheSmokeIsFarOffTheAxis) {
   EXPECT_NEAR(sum(lightPaths(scene, photons(1), 2)) / expected, 1.0, kSanitized ? 0.3 : 0.1);
 }
 
-// Lamps as bright as a float can say are no brighter than a pixel can hold.
+// Of a bright lamp near to, what a photon brings to a small pixel is more than a float can say, and
+// the pixel is not.
 TEST(LightPaths, ScaleWithTheirLamps) {
   TestScene scene = coneOfSmoke(0.2);
+  scene.camera = perspectiveCamera({0, -3, 0.4}, 4, 32);
   const std::vector<Rgb> dim = lightPaths(scene, 20'000, 3);
   scene.lights.clear();
   scene.lights.push_back(makeLight("spot", {{"position", "[2, -1, 2]"},
@@ -275,6 +278,24 @@ TEST(LightPaths, ScaleWithTheirLamps) {
     most = std::max(most, static_cast<double>(dim[i].x));
   }
   EXPECT_GT(most, 0.01);
+}
+
+// A lamp before the eye in smoke that goes on for ten thousand kilometres: next to what a pixel of
+// all that would have, a photon is brighter than any sum can hold.
+TEST(LightPaths, SayThatAPhotonIsTooBright) {
+  TestScene scene = coneOfSmoke(0.2);
+  scene.medium =
+      std::make_unique<transport::Medium>(makeMedium(boxVolume(Vec3d(1e7), Vec3i(8), {})));
+  scene.lights.clear();
+  scene.lights.push_back(makeLight("point", {{"position", "[0, 0, 0]"}}));
+  try {
+    lightPaths(scene, 20'000, 1);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("too bright for a pixel's"), std::string::npos)
+        << error.what();
+    EXPECT_NE(std::string(error.what()).find("path_traced"), std::string::npos) << error.what();
+  }
 }
 
 // Photons and their sums' quantum are the same whatever the number of photons: what a few have left

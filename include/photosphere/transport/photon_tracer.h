@@ -36,7 +36,8 @@ struct Flight {
   bool collided() const { return extinctionAtEnd > 0.0f; }
 };
 
-/// Takes flights; called from many threads at once with disjoint batches.
+/// Takes flights; called from many threads at once with disjoint batches. Must not throw: the last
+/// of a batch are handed over as it goes away.
 class FlightSink {
  public:
   virtual ~FlightSink() = default;
