@@ -59,7 +59,7 @@ class PerStep : public InscatterSource {
       m_readers.emplace_back(m_field.layout, medium, static_cast<int>(k));
   }
   bool carriesUnscattered() const override { return m_sets == 2; }
-  double clampedShare() const override { return m_clampedShare; }
+  double negativeShare() const override { return m_negativeShare; }
 
  protected:
   using Towards = std::vector<PhaseReader::Toward>;
@@ -86,11 +86,11 @@ class PerStep : public InscatterSource {
     (set == 0 ? result.multiple : result.single) += sigma * glm::max(light, Rgb(0.0f));
   }
 
-  // What reading clamps, measured on some carriers toward eight directions.
-  void measureClamped() {
+  // How much of what is read is below zero, measured on some carriers toward eight directions.
+  void measureNegative() {
     const std::size_t stride = m_field.carriers() / 2048 + 1;
     const sphere::Partition octants(1);
-    double below = 0, light = 0;
+    double below = 0, above = 0;
     PhaseReader::Toward toward;
     for (int k = 0; k < octants.size(); ++k)
       for (const PhaseReader& reader : m_readers) {
@@ -98,12 +98,11 @@ class PerStep : public InscatterSource {
         for (std::size_t i = 0; i < m_field.carriers(); i += stride)
           for (std::size_t s = 0; s < m_sets; ++s) {
             const Rgb read = reader.read(set(i, s), toward);
-            const Rgb clamped = glm::max(read, Rgb(0.0f));
-            light += static_cast<double>(meanComponent(clamped));
-            below += static_cast<double>(meanComponent(clamped - read));
+            above += static_cast<double>(meanComponent(glm::max(read, Rgb(0.0f))));
+            below += static_cast<double>(meanComponent(glm::max(-read, Rgb(0.0f))));
           }
       }
-    m_clampedShare = light > 0 ? below / light : 0.0;
+    m_negativeShare = above > 0 ? below / above : 0.0;
   }
 
   LightField m_field;
@@ -112,7 +111,7 @@ class PerStep : public InscatterSource {
 
  private:
   std::uint64_t m_id;
-  double m_clampedShare = 0.0;
+  double m_negativeShare = 0.0;
 };
 
 class VoxelSteps final : public PerStep {
@@ -138,7 +137,7 @@ class VoxelSteps final : public PerStep {
         }
     }
     sharpen(m_field.layout, again, m_field.values);
-    measureClamped();
+    measureNegative();
   }
 
   // Trilinear over the eight nearest voxel centres, inactive ones dark.
@@ -178,7 +177,7 @@ class ParticleSteps final : public PerStep {
     if (m_field.layout.merge == Merge::sampled)
       accumulate();
     else
-      measureClamped();
+      measureNegative();
   }
 
   Inscatter at(const Vec3f& p, const Vec3f& wo, const Coefficients& c) const override {

@@ -40,13 +40,13 @@ Rgb readOneBin(const LightFieldLayout& layout, const PhaseReader& reader, const 
   return reader.readBin(set, chosen, toward) * (total / binPower(layout, set, chosen));
 }
 
-// Light that was clamped and light that is read, summed over carriers in their order.
-struct Clamped {
-  double below = 0, light = 0;
+// Light below zero and above, as read from carriers, summed in their order.
+struct ReadLight {
+  double below = 0, above = 0;
   void count(Colours& colours) {
     for (Vec4f& colour : colours) {
       below += static_cast<double>(colour.w);
-      light += static_cast<double>(meanComponent(Rgb(colour)));
+      above += static_cast<double>(meanComponent(Rgb(colour)) + colour.w);
       colour.w = 0.0f;
     }
   }
@@ -65,8 +65,6 @@ Colours foldPhase(const LightField& field, const View& view, std::size_t set,
     for (std::size_t i = begin; i < end; ++i) {
       reader.turn(view.toEye(carrierPosition(field, i)), toward);
       const float* values = field.values.data() + i * stride + offset;
-      // Not clamped: the smooth reconstruction dips below zero beside a sharp peak and gives that
-      // light back elsewhere. Neighbours together hold enough light to be positive.
       Rgb colour;
       if (sampled) {
         Rng rng(key, RandomStream::merge, i);
@@ -74,10 +72,11 @@ Colours foldPhase(const LightField& field, const View& view, std::size_t set,
       } else {
         colour = reader.read(values, toward);
       }
-      // Harmonics, and a histogram's smooth reconstruction, dip below zero beside a sharp peak;
-      // light does not. The fourth value notes by how much.
-      const Rgb light = sampled ? colour : glm::max(colour, Rgb(0.0f));
-      colours[i] = Vec4f(light, meanComponent(light - colour));
+      // Harmonics, and a histogram's smooth reconstruction, dip below zero beside a sharp peak and
+      // give that light back elsewhere. Cutting it off here would make light of noise: neighbours
+      // together hold enough to be positive. The fourth value notes how much there is.
+      const Rgb below = sampled ? Rgb(0.0f) : glm::max(-colour, Rgb(0.0f));
+      colours[i] = Vec4f(colour, meanComponent(below));
     }
   });
   return colours;
@@ -109,7 +108,7 @@ class ResolvedField final : public InscatterSource {
       const PhaseReader reader(field.layout, medium, static_cast<int>(k));
       for (std::size_t set = 0; set < sets; ++set) {
         Colours folded = foldPhase(field, view, set, reader, key);
-        m_clamped.count(folded);
+        m_read.count(folded);
         if (m_weighted)
           folded = smoothWeighted(lattice, folded, *weights, field.layout);
         else if (gather)
@@ -135,8 +134,8 @@ class ResolvedField final : public InscatterSource {
     return result;
   }
   bool carriesUnscattered() const override { return m_unscattered; }
-  double clampedShare() const override {
-    return m_clamped.light > 0 ? m_clamped.below / m_clamped.light : 0.0;
+  double negativeShare() const override {
+    return m_read.above > 0 ? m_read.below / m_read.above : 0.0;
   }
 
  private:
@@ -152,12 +151,7 @@ class ResolvedField final : public InscatterSource {
                           const ParticleGather& gather, const Colours& folded) const {
     Smoothed smoothed;
     smoothed.once = gather.atVoxels(lattice, folded);
-    if (field.layout.holdsPower()) {
-      // Light is not negative, though weights of bins may be.
-      for (Vec4f& colour : smoothed.once)
-        colour = glm::max(colour, Vec4f(0.0f));
-      return smoothed.once;
-    }
+    if (field.layout.holdsPower()) return smoothed.once;
     const Field readable = layOut(lattice, smoothed.once);
     Colours atParticles(field.particles.size());
     for (std::size_t i = 0; i < atParticles.size(); ++i)
@@ -172,7 +166,7 @@ class ResolvedField final : public InscatterSource {
   bool m_weighted;  // colour over the fourth value is fluence
   Vec3f m_firstNode{0.0f};
   float m_inverseEdge = 1.0f;
-  Clamped m_clamped;
+  ReadLight m_read;
   std::vector<Field> m_fields;
 };
 

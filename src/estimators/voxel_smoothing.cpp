@@ -150,7 +150,7 @@ Colours sharpenedVoxels(const SupportLattice& lattice, const Colours& colours, S
 Colours sharpened(const Smoothed& smoothed) {
   Colours out(smoothed.once.size());
   for (std::size_t i = 0; i < out.size(); ++i)
-    out[i] = glm::max(Vec4f(0.0f), 2.0f * smoothed.once[i] - smoothed.again[i]);
+    out[i] = 2.0f * smoothed.once[i] - smoothed.again[i];
   return out;
 }
 

@@ -23,12 +23,11 @@ Smoothed smoothVoxels(const transport::SupportLattice& lattice, const Colours& c
                       SpatialKernel kernel, double radius);
 
 /// Adds what a second blur takes away ("twicing", Stuetzle & Mittal 1979): the bias of voxel mean,
-/// kernel and interpolation falls from second to fourth order in their width. Light stays >= 0:
-/// what is below is cut off.
+/// kernel and interpolation falls from second to fourth order in their width.
 Colours sharpened(const Smoothed& smoothed);
-/// Smooths and sharpens so, and inside the smoke leaves as much light as there was: what is cut off
-/// below zero turns noise into light. A voxel may be left with less than none, by as much as there
-/// is around it; the sum over a ray hardly ever is.
+/// Smooths and sharpens so, and inside the smoke leaves as much light as there was: to cut off what
+/// is below zero turns noise into light. A voxel may be left with less than none, by as much as
+/// there is around it; the sum over a ray hardly ever is.
 Colours sharpenedVoxels(const transport::SupportLattice& lattice, const Colours& colours,
                         SpatialKernel kernel, double radius);
 

@@ -39,7 +39,7 @@ void eachNumber(Statistics& s, State& state) {
                       &s.energyCapped, &s.energyError})
     state.value(*power);
   state.value(s.majorantViolations);
-  state.value(s.clampedLight);
+  state.value(s.negativeLight);
   state.value(s.pathsCapped);
   state.value(s.pathsCappedRadiance);
 }

@@ -13,13 +13,13 @@ namespace photosphere::scene {
 
 namespace {
 
-// A basis that can go negative is clamped where it is read.
-void noteClamped(double share, FrameSetup& setup, FrameStatistics& statistics) {
-  statistics.clampedLight = share;
+// A basis that can go negative rings beside sharp peaks.
+void noteNegative(double share, FrameSetup& setup, FrameStatistics& statistics) {
+  statistics.negativeLight = share;
   if (!(share > 0.001)) return;
   setup.notes.push_back(fmt::format(
-      "{:.2g} of the stored light is below zero toward where it is read and counts as 0, a bias of "
-      "the basis beside sharp peaks; raise estimator.{}",
+      "{:.2g} of the stored light is below zero toward where it is read: the basis rings beside "
+      "sharp peaks; raise estimator.{}",
       share,
       setup.layout.basis == estimators::Basis::sphericalHarmonics
           ? "order, or smooth with estimator.kernel"
@@ -61,7 +61,7 @@ PassLight prepareLight(const SceneFile& scene, const RenderRequest& request, int
   if (wider) light.wider = widened(setup, field);
   auto source = estimators::resolve(*setup.medium, std::move(field), setup.view, setup.key);
   result.statistics.seconds.resolve += watch.seconds();
-  noteClamped(source->clampedShare(), setup, result.statistics);
+  noteNegative(source->negativeShare(), setup, result.statistics);
   light.source = std::move(source);
   return light;
 }

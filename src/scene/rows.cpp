@@ -187,9 +187,8 @@ std::span<const Param> estimatorParams() {
        .unit = "",
        .defaultText = "auto",
        .help =
-           "how directions are stored; auto = view, or histogram with a light cache, an option of "
-           "bins, or phase functions with a lobe of |g| >= 0.85 and not all >= 0.99 (then of 4 "
-           "rows)",
+           "how directions are stored; auto = view, or histogram with a light cache or an option "
+           "of bins (of 4 rows where a phase function has a lobe of |g| >= 0.85)",
        .choices = "auto|histogram|spherical_harmonics|view"},
       {.name = "deposit",
        .type = ParamType::text,

@@ -57,7 +57,7 @@ std::string statsJson(const FrameStatistics& s) {
     json["error"] = {{"estimate", s.error->total()}, {"noise", s.error->noise},
                      {"bias", s.error->bias},        {"doubt", s.error->doubt},
                      {"batches", s.batches},         {"target_missed", s.targetMissed}};
-  if (s.clampedLight > 0) json["clamped_light"] = s.clampedLight;
+  if (s.negativeLight > 0) json["negative_light"] = s.negativeLight;
   json["effects"] = effectsJson(s.effects);
   json["image"] = {{"mean", s.imageMean}, {"max", s.imageMax}};
   json["version"] = versionText();

@@ -46,7 +46,7 @@ const Scene& plume(double g) {
 struct AngularError {
   double mean = 0, l2 = 0;  // ratio of means; norm of the difference over norm
   double blocks = 0;        // the same norm over means of 8 x 8 pixels
-  double clamped = 0;
+  double negative = 0;
 };
 
 // Error against the view basis of the same photons: what directions alone are to blame for, as in
@@ -77,12 +77,12 @@ AngularError judge(double g, const LightFieldLayout& layout, int samples = 4, in
   AngularError e;
   e.l2 = norm(1, e.mean);
   e.blocks = norm(8, e.mean);
-  e.clamped = f.clampedShare;
+  e.negative = f.negativeShare;
   std::printf(
-      "  g %.1f, %3d values%s, %2d rays: mean %.4f, L2 %.4f (blocks %.4f), clamped %.5f; march "
+      "  g %.1f, %3d values%s, %2d rays: mean %.4f, L2 %.4f (blocks %.4f), negative %.5f; march "
       "%.2f s\n",
       g, layout.bins(), layout.basis == Basis::histogram ? " (bins)" : "", rays, e.mean, e.l2,
-      e.blocks, e.clamped, f.marchSeconds);
+      e.blocks, e.negative, f.marchSeconds);
   return e;
 }
 
@@ -111,7 +111,7 @@ TEST(Harmonics, ErrorFallsWithTheOrder) {
   // A series that is cut as it may be puts hardly anything below zero (0.2 dark in order 2 at 0.7,
   // where it was cut as it is).
   for (const auto& [key, e] : found)
-    EXPECT_LT(e.clamped, 0.001) << key.first << ' ' << key.second;
+    EXPECT_LT(e.negative, 0.001) << key.first << ' ' << key.second;
 }
 
 // A lobe far narrower than the order: cut as it is it rings to several times the light (mean 5.3 at
@@ -121,7 +121,7 @@ TEST(Harmonics, DoNotRingWhereALobeIsNarrow) {
     const AngularError e = judge(g, layoutOf(Basis::sphericalHarmonics, 8));
     if (kSanitized) continue;
     EXPECT_NEAR(e.mean, 1.0, 0.3) << g;
-    EXPECT_LT(e.clamped, 0.05) << g;
+    EXPECT_LT(e.negative, 0.05) << g;
   }
 }
 

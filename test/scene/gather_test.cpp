@@ -54,7 +54,7 @@ TEST_F(GatherScene, HarmonicsAreNamedAndCached) {
   const FrameResult sharp = renderScene(
       make({"estimator.basis=spherical_harmonics", "estimator.order=2", "volume.0.phase.g=0.9"}),
       1);
-  EXPECT_GT(sharp.statistics.clampedLight, 0.001);
+  EXPECT_GT(sharp.statistics.negativeLight, 0.001);
   EXPECT_TRUE(std::any_of(sharp.notes.begin(), sharp.notes.end(),
                           [](const std::string& note) { return contains(note, "below zero"); }));
 }

@@ -126,7 +126,7 @@ PhotosphereFrame renderPhotosphere(const TestScene& scene, estimators::LightFiel
   frame.traceSeconds = trace.seconds();
   Stopwatch resolveWatch;
   const auto source = estimators::resolve(*scene.medium, field, scene.view(), options.key);
-  frame.clampedShare = source->clampedShare();
+  frame.negativeShare = source->negativeShare();
   frame.resolveSeconds = resolveWatch.seconds();
   marchFrame(scene, *source, seed, samples, gatherRays, frame);
   return frame;

@@ -56,7 +56,7 @@ struct PhotosphereFrame {
   render::FrameLayers layers;
   transport::TraceStatistics statistics;
   double traceSeconds = 0, resolveSeconds = 0, marchSeconds = 0;
-  double clampedShare = 0;
+  double negativeShare = 0;
 };
 /// A frame rendered by the photosphere; layout.radius 0 = automatic.
 /// @param gatherRays  final gathering, rays of each camera sample

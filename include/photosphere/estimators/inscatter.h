@@ -24,9 +24,9 @@ class InscatterSource {
   /// True when the light of lamps with extent is in `Inscatter::single` and must not be sampled
   /// again.
   virtual bool carriesUnscattered() const = 0;
-  /// Light below zero that is clamped to 0, over all light that is read: the bias of a basis that
-  /// can go negative.
-  virtual double clampedShare() const { return 0.0; }
+  /// Light that carriers show below zero, over what they show above: how much a basis rings that
+  /// can. It is kept, so that sums are right; a ray's sum is no less than 0.
+  virtual double negativeShare() const { return 0.0; }
 };
 
 /// The eye that looks at the smoke, local space.

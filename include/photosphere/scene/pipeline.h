@@ -48,7 +48,7 @@ struct FrameStatistics {
   Vec3d energyEmitted{0.0}, energyMissed{0.0}, energyAbsorbed{0.0}, energyEscaped{0.0},
       energyCapped{0.0}, energyError{0.0};
   std::uint64_t nanSamples = 0, negativeSamples = 0, majorantViolations = 0;
-  double clampedLight = 0;         ///< InscatterSource::clampedShare
+  double negativeLight = 0;        ///< InscatterSource::negativeShare
   std::uint64_t pathsCapped = 0;   ///< ended by max_scatter, from either end
   double pathsCappedRadiance = 0;  ///< throughput they still carried, summed
   std::vector<EffectState> effects;
