@@ -15,6 +15,14 @@ inline Float4 load(const float* p) {
   return v;
 }
 
+/// Lane by lane.
+inline Float4 max(Float4 a, Float4 b) {
+  return a < b ? b : a;
+}
+inline Float4 min(Float4 a, Float4 b) {
+  return b < a ? b : a;
+}
+
 /// a[0], a[1], b[0], b[1].
 inline Float4 loadPairs(const float* a, const float* b) {
   using Double2 = double __attribute__((vector_size(16)));
