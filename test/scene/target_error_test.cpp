@@ -209,6 +209,35 @@ TEST_F(TargetError, TheEstimateIsTheErrorThatThereIs) {
   }
 }
 
+// The few pixels of a crop, at the edge of the smoke and in it, are judged as a frame is.
+TEST_F(TargetError, OfACropIsThatOfItsPixels) {
+  if (kSanitized) GTEST_SKIP() << "a truth of many paths, too slow under a sanitizer";
+  for (const render::Crop& crop :
+       {render::Crop{{2, 8}, {18, 24}}, render::Crop{{12, 12}, {20, 20}}}) {
+    RenderRequest request;
+    request.crop = crop;
+    const auto with = [&](const std::vector<std::string>& sets) {
+      return renderScene(scene(sets), 1, request);
+    };
+    const FrameResult truth = with({"estimator.type=path_traced", "estimator.samples=10000"});
+    for (std::vector<std::string> sets :
+         {std::vector<std::string>{"estimator.type=path_traced", "estimator.samples=32"},
+          {"estimator.type=light_traced", "estimator.samples=32"},
+          {"estimator.type=photosphere", "estimator.photons=400000", "estimator.radius=0.5"}}) {
+      sets.emplace_back("render.target_error=10");
+      const FrameResult r = with(sets);
+      ASSERT_TRUE(r.statistics.error) << sets[0];
+      const double is = relativeError(r.layers.beauty, truth.layers.beauty);
+      const ErrorEstimate e = *r.statistics.error;
+      std::printf("  %s: estimate %.4f (noise %.4f, bias %.4f), error %.4f\n", sets[0].c_str(),
+                  e.total(), e.noise, e.bias, is);
+      EXPECT_EQ(r.error.size(), truth.layers.beauty.size());
+      EXPECT_GT(e.total(), 0.6 * is) << sets[0];
+      EXPECT_LT(e.total(), 1.6 * is) << sets[0];
+    }
+  }
+}
+
 TEST_F(TargetError, GoesOnUntilItIsMet) {
   const auto until = [&](const std::string& target) {
     return render(
