@@ -189,6 +189,8 @@ void Checkpoint::save(const std::string& part, const WriteState& write) {
     writeSealed(fileOf(part), m_work, write);
   } catch (const OutputError& error) {
     if (!std::exchange(m_warned, true)) log::warning("no checkpoint: {}", error.what());
+    std::error_code ignored;
+    fs::remove(m_folder, ignored);  // an empty folder is no checkpoint
   }
   m_last = Clock::now();
   m_saveSeconds = std::chrono::duration<double>(m_last - start).count();

@@ -43,12 +43,12 @@ class Faults : public ::testing::Test {
 
   RunResult shell(const std::string& command) { return runShell(command, m_folder.path()); }
 
-  /// Names of all files below the folder, of links too; not of folders, and not of references,
-  /// which a study keeps for the next.
+  /// Names of all files below the folder, of links and folders of checkpoints too; not of other
+  /// folders, and not of references, which a study keeps for the next.
   std::set<std::string> files() const {
     std::set<std::string> names;
     for (const auto& entry : fs::recursive_directory_iterator(m_folder.path()))
-      if (!entry.is_directory())
+      if (!entry.is_directory() || entry.path().extension() == ".checkpoint")
         names.insert(entry.path().lexically_relative(m_folder.path()).string());
     std::erase_if(names, [](const std::string& name) { return name.starts_with("cache/"); });
     return names;
@@ -134,6 +134,11 @@ const FaultCase kFileSizeLimit[] = {
      "ulimit -f 8; $P render scene.toml -o x.exr --frames 1",
      6,
      {"x.exr: cannot be written", "ulimit -f"}},
+    {"RenderWithCheckpoints",
+     "ulimit -f 8; $P render scene.toml -o x.exr --frames 1 --checkpoint-interval 0.1 --res 64x64 "
+     "-s estimator.type=path_traced -s estimator.samples=1000",
+     6,
+     {"no checkpoint", "x.exr: cannot be written", "ulimit -f"}},
     {"Trace",
      "ulimit -f 8; $P trace scene.toml -o x.vdb --frames 1",
      6,
