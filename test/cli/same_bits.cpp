@@ -384,6 +384,24 @@ TEST_F(Interrupted, AMissedTargetIsNotForgotten) {
   EXPECT_EQ(alone.exitCode, 0) << alone.err;
 }
 
+// Wherever the signal falls: in a part, in the paths that it is judged by, in wider kernels.
+TEST_F(Interrupted, AnywhereInAFrameThatIsJudged) {
+  const std::string paths = "-s estimator.photons=40000 -s render.samples=100";
+  const std::string job = std::string(PHOTOSPHERE_TOOL) +
+                          " render scene.toml --frames 1 --float --target-error 0.1 " + paths;
+  ASSERT_EQ(runShell(job + " -o whole.exr", m_folder.path()).exitCode, 0);
+  const RunResult result =
+      runShell("for t in 0.3 0.2 0.4 0.3 0.5 0.35 0.6; do timeout --preserve-status -s TERM $t " +
+                   job + " -o x.exr; echo code $?; [ -e x.exr ] && break; done; [ -e x.exr ] || " +
+                   job + " -o x.exr",
+               m_folder.path());
+  ASSERT_EQ(result.exitCode, 0) << result.err;
+  EXPECT_NE(result.out.find("code 75"), std::string::npos) << "too quick to be stopped";
+  EXPECT_NE(result.err.find("goes on from"), std::string::npos) << result.err;
+  expectSamePixels("whole.exr", "x.exr");
+  EXPECT_FALSE(fs::exists(m_folder / "x.exr.checkpoint"));
+}
+
 TEST_F(Interrupted, EverySignalLeavesAtMostACheckpoint) {
   const auto before = namesIn(m_folder.path());
   for (const char* signal : {"INT", "TERM", "USR1"}) {
