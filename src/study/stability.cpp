@@ -59,10 +59,11 @@ class Table {
 
   std::vector<StabilityRow> run() {
     for (const StabilityCase& c : m_catalogue.cases) {
-      if (!wanted(c.name) || (m_options.quick && !c.quick)) continue;
+      const std::vector<SlabRadiance> slabs = wantedSlabs(c);
+      if ((slabs.empty() && !wanted(c.name)) || (m_options.quick && !c.quick)) continue;
       m_frames.clear();
       if (c.trace == "slab_radiance")
-        runSlabRadiance(c);
+        runSlabRadiance(c, slabs);
       else if (!c.trace.empty())
         runTrace(c);
       else
@@ -77,6 +78,17 @@ class Table {
     return m_options.cases.empty() ||
            std::any_of(m_options.cases.begin(), m_options.cases.end(),
                        [&](const std::string& begin) { return name.starts_with(begin); });
+  }
+
+  // The name of a slab's row.
+  static std::string nameOf(const StabilityCase& c, const SlabRadiance& slab) {
+    return fmt::format("{}_tau{:g}_albedo{:g}", c.name, slab.tau, slab.albedo);
+  }
+  std::vector<SlabRadiance> wantedSlabs(const StabilityCase& c) const {
+    if (c.trace != "slab_radiance") return {};
+    std::vector<SlabRadiance> slabs = slabRadiances(c.slab.number("g", 0), m_options.quick);
+    std::erase_if(slabs, [&](const SlabRadiance& slab) { return !wanted(nameOf(c, slab)); });
+    return slabs;
   }
 
   // A name that nothing has would pass by testing nothing.
@@ -97,8 +109,17 @@ class Table {
           if (!known(name)) refuse(c.name, name);
     for (const std::string& begin : m_options.cases)
       if (std::none_of(m_catalogue.cases.begin(), m_catalogue.cases.end(),
-                       [&](const StabilityCase& c) { return c.name.starts_with(begin); }))
+                       [&](const StabilityCase& c) { return namesBegin(c, begin); }))
         throw ConfigError(fmt::format("--case {}: no hard case has a name that begins so", begin));
+  }
+
+  bool namesBegin(const StabilityCase& c, const std::string& begin) const {
+    if (c.name.starts_with(begin)) return true;
+    if (c.trace != "slab_radiance" || !begin.starts_with(c.name)) return false;
+    const std::vector<SlabRadiance> all = slabRadiances(c.slab.number("g", 0), false);
+    return std::any_of(all.begin(), all.end(), [&](const SlabRadiance& slab) {
+      return nameOf(c, slab).starts_with(begin);
+    });
   }
 
   std::vector<const StabilityEstimator*> estimatorsOf(const StabilityCase& c) const {
@@ -317,8 +338,7 @@ class Table {
     finish(std::move(row));
   }
 
-  void runSlabRadiance(const StabilityCase& c) {
-    const std::vector<SlabRadiance> slabs = slabRadiances(c.slab.number("g", 0), m_options.quick);
+  void runSlabRadiance(const StabilityCase& c, const std::vector<SlabRadiance>& slabs) {
     for (const StabilityEstimator* e : estimatorsOf(c))
       for (const SlabRadiance& slab : slabs)
         runSlab(c, *e, slab);
@@ -327,7 +347,7 @@ class Table {
   // The worst direction of one slab.
   void runSlab(const StabilityCase& c, const StabilityEstimator& e, const SlabRadiance& slab) {
     StabilityRow row = rowOf(c, e.name);
-    row.name = fmt::format("{}_tau{:g}_albedo{:g}", c.name, slab.tau, slab.albedo);
+    row.name = nameOf(c, slab);
     std::uint64_t violations = 0;
     for (const SlabRadiance::Direction& d : slab.directions) {
       Sets sets = c.set;

@@ -20,8 +20,9 @@ double halfWidth(double tau) {
 }
 constexpr double kSeen = 3;
 // Light that so few photons of a case reach takes more of them.
-constexpr double kFaint = 1e-3;
+constexpr double kFaint = 1e-3, kDim = 1e-2;
 constexpr const char* kFaintPhotons = "estimator.photons=32000000";
+constexpr const char* kDimPhotons = "estimator.photons=8000000";
 
 }  // namespace
 
@@ -50,7 +51,7 @@ std::vector<std::string> SlabRadiance::settings(const Direction& d) const {
       fmt::format("camera={{ type = \"orthographic\", position = [{}, 0, {}], look_at = [0, 0, "
                   "0], up = [0, 1, 0], width = {}, resolution = [8, {}] }}",
                   s * far, side * d.mu * far, 2 * kSeen, rows)};
-  if (faint) sets.emplace_back(kFaintPhotons);
+  if (d.value < kDim) sets.emplace_back(faint ? kFaintPhotons : kDimPhotons);
   return sets;
 }
 

@@ -36,11 +36,11 @@ void writeCatalogue(const TemporaryFolder& folder, const std::string& cases) {
   writeText(folder / "cases/a.toml", cases);
 }
 
-std::string complaintAbout(const std::string& cases) {
+std::string complaintAbout(const std::string& cases, const std::vector<std::string>& names = {}) {
   const TemporaryFolder folder;
   writeCatalogue(folder, cases);
   try {
-    runStability({.catalogue = folder.path(), .quick = true, .cases = {}, .estimators = {}}, {});
+    runStability({.catalogue = folder.path(), .quick = true, .cases = names, .estimators = {}}, {});
   } catch (const ConfigError& error) {
     return error.what();
   }
@@ -89,10 +89,11 @@ TEST(Stability, TheCatalogueRefusesWhatItDoesNotKnow) {
             std::string::npos);
 }
 
-std::vector<StabilityRow> rowsOf(const std::string& cases) {
+std::vector<StabilityRow> rowsOf(const std::string& cases,
+                                 const std::vector<std::string>& names = {}) {
   const TemporaryFolder folder;
   writeCatalogue(folder, cases);
-  return runStability({.catalogue = folder.path(), .quick = true, .cases = {}, .estimators = {}},
+  return runStability({.catalogue = folder.path(), .quick = true, .cases = names, .estimators = {}},
                       {});
 }
 
@@ -129,6 +130,22 @@ TEST(Stability, RowsPassWhenTheAnswerIsThat) {
   EXPECT_TRUE(rows[0].passed) << rows[0].message;
   EXPECT_TRUE(rows[1].passed) << rows[1].message;
   EXPECT_FALSE(rows[2].passed);
+}
+
+TEST(Stability, RowsAreChosenByTheirNames) {
+  const std::string slab =
+      "[[case]]\nname = \"a\"\nhard = \"-\"\ntrace = \"slab_radiance\"\nslab = { g = 0 }\n"
+      "set = [\"estimator.photons=1000\"]\nestimators = [\"view\"]\n"
+      "oracle = { kind = \"table\" }\nbound = 1e-9\n";
+  const auto rows = rowsOf(slab, {"a_tau2_albedo0.9"});
+  ASSERT_EQ(rows.size(), 1u);
+  EXPECT_EQ(rows[0].name, "a_tau2_albedo0.9");
+  EXPECT_FALSE(rows[0].passed);
+  EXPECT_TRUE(rowsOf(slab, {"a_tau8"}).empty());  // not in the small size
+  EXPECT_NE(complaintAbout(slab, {"a_tau3"}).find("no hard case has a name that begins so"),
+            std::string::npos);
+  EXPECT_NE(complaintAbout(slab, {"b"}).find("no hard case has a name that begins so"),
+            std::string::npos);
 }
 
 }  // namespace
