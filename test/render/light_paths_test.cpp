@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <map>
+#include <numeric>
 
 #include "photosphere/core/error.h"
 #include "photosphere/core/parallel.h"
@@ -101,14 +102,16 @@ void expectAgreement(const TestScene& scene, std::uint64_t photons, int samples,
   const Blocks theirs = blocksOf(camera, kEdge, kSeeds, channel, [&](std::uint64_t seed) {
     return eyePaths(scene, samples, 100 + seed, picture);
   });
-  double a = 0, b = 0, noise = 0;
+  const double a = std::accumulate(ours.mean.begin(), ours.mean.end(), 0.0);
+  const double b = std::accumulate(theirs.mean.begin(), theirs.mean.end(), 0.0);
+  const double dark = 1e-4 * b / static_cast<double>(theirs.mean.size());
+  double noise = 0;
   for (std::size_t i = 0; i < ours.mean.size(); ++i) {
-    a += ours.mean[i];
-    b += theirs.mean[i];
     const double error = std::hypot(ours.error[i], theirs.error[i]);
     noise += error * error;
-    // Student's t of seven degrees: beyond 7 one block in 5000.
-    EXPECT_NEAR(ours.mean[i], theirs.mean[i], 7 * error + 0.003 * theirs.mean[i] + 1e-12)
+    // Student's t of seven degrees: beyond 7 one block in 5000. Where hardly a path arrives, the
+    // spread of eight frames does not tell their error.
+    EXPECT_NEAR(ours.mean[i], theirs.mean[i], 7 * error + 0.003 * theirs.mean[i] + dark)
         << "block " << i;
   }
   ASSERT_GT(b, 0);
@@ -130,7 +133,7 @@ std::uint64_t photons(double millions) {
 int paths(int count) {
   return std::max(8, kSanitized ? count / 10 : count);
 }
-constexpr double kClose = kSanitized ? 0.08 : 0.03;
+constexpr double kClose = kSanitized ? 0.12 : 0.03;
 
 TEST(LightPaths, AreThePictureOfPathsFromTheEye) {
   expectAgreement(coneOfSmoke(0.0), photons(0.15), paths(150), kClose);
