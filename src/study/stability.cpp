@@ -59,11 +59,10 @@ class Table {
 
   std::vector<StabilityRow> run() {
     for (const StabilityCase& c : m_catalogue.cases) {
-      const std::vector<SlabRadiance> slabs = wantedSlabs(c);
-      if ((slabs.empty() && !wanted(c.name)) || (m_options.quick && !c.quick)) continue;
+      if (!chosen(c) || (m_options.quick && !c.quick)) continue;
       m_frames.clear();
       if (c.trace == "slab_radiance")
-        runSlabRadiance(c, slabs);
+        runSlabRadiance(c);
       else if (!c.trace.empty())
         runTrace(c);
       else
@@ -74,21 +73,27 @@ class Table {
   }
 
  private:
-  bool wanted(const std::string& name) const {
+  template <class Matches>
+  bool anyChoice(const Matches& matches) const {
     return m_options.cases.empty() ||
-           std::any_of(m_options.cases.begin(), m_options.cases.end(),
-                       [&](const std::string& begin) { return name.starts_with(begin); });
+           std::any_of(m_options.cases.begin(), m_options.cases.end(), matches);
+  }
+  bool chosen(const StabilityCase& c) const {
+    return anyChoice([&](const std::string& begin) { return beginsRow(c, begin); });
   }
 
   // The name of a slab's row.
   static std::string nameOf(const StabilityCase& c, const SlabRadiance& slab) {
     return fmt::format("{}_tau{:g}_albedo{:g}", c.name, slab.tau, slab.albedo);
   }
-  std::vector<SlabRadiance> wantedSlabs(const StabilityCase& c) const {
-    if (c.trace != "slab_radiance") return {};
-    std::vector<SlabRadiance> slabs = slabRadiances(c.slab.number("g", 0), m_options.quick);
-    std::erase_if(slabs, [&](const SlabRadiance& slab) { return !wanted(nameOf(c, slab)); });
-    return slabs;
+  // Whether a row of the case has a name that begins so.
+  static bool beginsRow(const StabilityCase& c, const std::string& begin) {
+    if (c.name.starts_with(begin)) return true;
+    if (c.trace != "slab_radiance" || !begin.starts_with(c.name)) return false;
+    const std::vector<SlabRadiance> slabs = slabRadiances(c.slab.number("g", 0), false);
+    return std::any_of(slabs.begin(), slabs.end(), [&](const SlabRadiance& slab) {
+      return nameOf(c, slab).starts_with(begin);
+    });
   }
 
   // A name that nothing has would pass by testing nothing.
@@ -109,17 +114,8 @@ class Table {
           if (!known(name)) refuse(c.name, name);
     for (const std::string& begin : m_options.cases)
       if (std::none_of(m_catalogue.cases.begin(), m_catalogue.cases.end(),
-                       [&](const StabilityCase& c) { return namesBegin(c, begin); }))
+                       [&](const StabilityCase& c) { return beginsRow(c, begin); }))
         throw ConfigError(fmt::format("--case {}: no hard case has a name that begins so", begin));
-  }
-
-  bool namesBegin(const StabilityCase& c, const std::string& begin) const {
-    if (c.name.starts_with(begin)) return true;
-    if (c.trace != "slab_radiance" || !begin.starts_with(c.name)) return false;
-    const std::vector<SlabRadiance> all = slabRadiances(c.slab.number("g", 0), false);
-    return std::any_of(all.begin(), all.end(), [&](const SlabRadiance& slab) {
-      return nameOf(c, slab).starts_with(begin);
-    });
   }
 
   std::vector<const StabilityEstimator*> estimatorsOf(const StabilityCase& c) const {
@@ -338,7 +334,12 @@ class Table {
     finish(std::move(row));
   }
 
-  void runSlabRadiance(const StabilityCase& c, const std::vector<SlabRadiance>& slabs) {
+  void runSlabRadiance(const StabilityCase& c) {
+    std::vector<SlabRadiance> slabs = slabRadiances(c.slab.number("g", 0), m_options.quick);
+    std::erase_if(slabs, [&](const SlabRadiance& slab) {
+      return !anyChoice(
+          [&](const std::string& begin) { return nameOf(c, slab).starts_with(begin); });
+    });
     for (const StabilityEstimator* e : estimatorsOf(c))
       for (const SlabRadiance& slab : slabs)
         runSlab(c, *e, slab);

@@ -93,8 +93,8 @@ int giveInChild(const Target& target, std::size_t end,
   return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
 }
 
-/// Whether a sanitizer reports what the library does by itself: in its headers, or in one of the
-/// uppermost frames, those of the standard library beneath aside. Not ours to mend.
+/// Whether a sanitizer reports what the library does by itself: in its headers, in one of the
+/// uppermost frames, or in the first that is not of the standard library. Not ours to mend.
 bool isOfOpenVdb(int code, const std::string& report) {
   if (code != test::kSanitizerExit) return false;
   const std::size_t error = report.find(": runtime error: ");
@@ -105,12 +105,13 @@ bool isOfOpenVdb(int code, const std::string& report) {
   const auto holds = [](const std::string& line, const char* text) {
     return line.find(text) != std::string::npos;
   };
-  for (int frame = 0, counted = 0; counted < 4; ++frame) {
+  bool standard = true;  // so far
+  for (int frame = 0; frame < 4 || standard; ++frame) {
     const std::size_t begin = report.find("    #" + std::to_string(frame) + " 0x");
     if (begin == std::string::npos) return false;
     const std::string line = report.substr(begin, report.find('\n', begin) - begin);
     if (holds(line, "openvdb::v") || holds(line, "libopenvdb")) return true;
-    if (!holds(line, " in std::") && !holds(line, " in operator new")) ++counted;
+    standard = standard && (holds(line, " in std::") || holds(line, " in operator new"));
   }
   return false;
 }

@@ -104,13 +104,14 @@ void expectAgreement(const TestScene& scene, std::uint64_t photons, int samples,
   });
   const double a = std::accumulate(ours.mean.begin(), ours.mean.end(), 0.0);
   const double b = std::accumulate(theirs.mean.begin(), theirs.mean.end(), 0.0);
-  const double dark = 1e-4 * b / static_cast<double>(theirs.mean.size());
+  // Of the few paths that a sanitizer leaves time for hardly one meets a dark block, and the spread
+  // of eight frames does not tell their error.
+  const double dark = kSanitized ? 1e-4 * b / static_cast<double>(theirs.mean.size()) : 1e-12;
   double noise = 0;
   for (std::size_t i = 0; i < ours.mean.size(); ++i) {
     const double error = std::hypot(ours.error[i], theirs.error[i]);
     noise += error * error;
-    // Student's t of seven degrees: beyond 7 one block in 5000. Where hardly a path arrives, the
-    // spread of eight frames does not tell their error.
+    // Student's t of seven degrees: beyond 7 one block in 5000.
     EXPECT_NEAR(ours.mean[i], theirs.mean[i], 7 * error + 0.003 * theirs.mean[i] + dark)
         << "block " << i;
   }
@@ -128,12 +129,12 @@ TestScene coneOfSmoke(double g, const Rgb& tint = Rgb(1.0f)) {
 }
 
 std::uint64_t photons(double millions) {
-  return static_cast<std::uint64_t>(millions * (kSanitized ? 1e5 : 1e6));
+  return static_cast<std::uint64_t>(millions * (kSanitized ? 1.5e5 : 1e6));
 }
 int paths(int count) {
-  return std::max(8, kSanitized ? count / 10 : count);
+  return std::max(8, kSanitized ? count / 6 : count);
 }
-constexpr double kClose = kSanitized ? 0.12 : 0.03;
+constexpr double kClose = kSanitized ? 0.08 : 0.03;
 
 TEST(LightPaths, AreThePictureOfPathsFromTheEye) {
   expectAgreement(coneOfSmoke(0.0), photons(0.15), paths(150), kClose);
