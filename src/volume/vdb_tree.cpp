@@ -62,7 +62,7 @@ class Walk {
   Walk(VdbCursor& in, const VdbTree& tree, const ValueType& type)
       : m_in(in), m_tree(tree), m_type(type) {}
 
-  void run() {
+  bool run() {
     const std::uint64_t background = 4 + m_type.bytes;  // after the number of buffers
     m_in.skip(background, "a tree's background");
     const std::uint64_t at = m_in.position();
@@ -70,7 +70,7 @@ class Walk {
     const auto children = m_in.value<std::uint32_t>("a tree's size");
     checkRoom(at, tiles, children);
     m_in.skip(tiles * tileBytes(), "a tree's tiles");
-    if (!m_tree.nodesKnown) return;
+    if (!m_tree.nodesKnown) return false;
     // OpenVDB keeps nodes in the order of their origins and reads their values in it.
     std::map<std::array<std::int32_t, 3>, Counts> leaves;
     for (std::uint32_t i = 0; i < children; ++i) {
@@ -80,17 +80,18 @@ class Walk {
       if (!fresh) fail(originAt, "has two nodes at one place");
       walkInner<5>(place->second);
     }
-    if (m_in.position() != m_tree.blockPos)
+    if (m_tree.placed && m_in.position() != m_tree.blockPos)
       fail(m_in.position(), fmt::format("has structure that does not end at byte {}, where its "
                                         "values begin",
                                         m_tree.blockPos));
-    if (m_type.leaf == Leaf::points) return;
+    if (m_type.leaf == Leaf::points) return false;
     for (const auto& [origin, counts] : leaves)
       for (const std::uint16_t active : counts)
         walkLeaf(active);
-    if (m_in.position() != m_tree.endPos)
+    if (m_tree.placed && m_in.position() != m_tree.endPos)
       fail(m_in.position(),
            fmt::format("has values that do not end at byte {}, as it says", m_tree.endPos));
+    return true;
   }
 
  private:
@@ -105,7 +106,7 @@ class Walk {
   /// OpenVDB loops over what is claimed even past the end of the file.
   void checkRoom(std::uint64_t at, std::uint64_t tiles, std::uint64_t children) const {
     const std::uint64_t child = 12 + 2 * sizeof(Mask<5>);
-    const std::uint64_t end = m_tree.blockPos;
+    const std::uint64_t end = m_tree.placed ? m_tree.blockPos : m_in.size();
     const std::uint64_t room = end > m_in.position() ? end - m_in.position() : 0;
     if (tiles * tileBytes() > room || children * child > room - tiles * tileBytes())
       fail(at, fmt::format("claims {} tiles and {} nodes in {} bytes", tiles, children, room));
@@ -182,9 +183,9 @@ class Walk {
 
 }  // namespace
 
-void walkTree(VdbCursor& in, const VdbTree& tree) {
+bool walkTree(VdbCursor& in, const VdbTree& tree) {
   const ValueType* type = typeOf(tree.type);
-  if (type) Walk(in, tree, *type).run();
+  return type && Walk(in, tree, *type).run();
 }
 
 }  // namespace photosphere::volume

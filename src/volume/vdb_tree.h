@@ -15,7 +15,8 @@ inline constexpr std::uint32_t kVdbCompressions = kVdbZip | kVdbActiveMask | kVd
 struct VdbTree {
   std::string type;                        ///< of the grid, such as `Tree_float_5_4_3`
   std::string name;                        ///< of the grid, for messages
-  std::uint64_t blockPos = 0, endPos = 0;  ///< where values begin and end [bytes]
+  bool placed = true;                      ///< the file says where its values are
+  std::uint64_t blockPos = 0, endPos = 0;  ///< where they begin and end [bytes]
   std::uint32_t compression = 0;
   bool half = false;        ///< numbers are stored as half floats
   bool nodesKnown = false;  ///< file version 222 and later; earlier nodes are laid out otherwise
@@ -27,7 +28,8 @@ struct VdbTree {
 /// room for another (io/Compression.cc, bloscFromStream), and goes on past the end of a file.
 /// Of point grids the structure is walked and the values are not; of types that are not OpenVDB's
 /// own, nothing is.
+/// @return whether it came to the end of the grid
 /// @throws InputError naming the byte at fault
-void walkTree(VdbCursor& in, const VdbTree& tree);
+bool walkTree(VdbCursor& in, const VdbTree& tree);
 
 }  // namespace photosphere::volume

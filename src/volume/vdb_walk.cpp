@@ -95,8 +95,8 @@ std::uint64_t transformBytes(VdbCursor& in) {
   in.fail(at, fmt::format("unknown transform type \"{}\"", type));
 }
 
-void walkGrid(VdbCursor& in, const VdbContents& contents, const VdbDescriptor& grid,
-              std::uint64_t positionsAt) {
+// Goes to where the grid begins, as far as the file says that.
+void seekGrid(VdbCursor& in, const VdbDescriptor& grid, std::uint64_t positionsAt) {
   const auto size = static_cast<std::int64_t>(in.size());
   const auto here = static_cast<std::int64_t>(in.position());
   const bool instance = !grid.instance.empty();
@@ -109,8 +109,15 @@ void walkGrid(VdbCursor& in, const VdbContents& contents, const VdbDescriptor& g
                         "the file was not written to its end or not copied whole",
                         plainName(grid), grid.gridPos, grid.endPos, grid.blockPos, size));
   in.seek(static_cast<std::uint64_t>(grid.gridPos));
-  VdbTree tree{grid.type, plainName(grid), static_cast<std::uint64_t>(grid.blockPos),
-               static_cast<std::uint64_t>(grid.endPos)};
+}
+
+// Goes to the grid's end. @return whether that could be found
+bool walkGrid(VdbCursor& in, const VdbContents& contents, const VdbDescriptor& grid,
+              std::uint64_t positionsAt) {
+  const bool instance = !grid.instance.empty();
+  if (contents.hasOffsets) seekGrid(in, grid, positionsAt);
+  VdbTree tree{grid.type, plainName(grid), contents.hasOffsets,
+               static_cast<std::uint64_t>(grid.blockPos), static_cast<std::uint64_t>(grid.endPos)};
   tree.nodesKnown = contents.fileVersion >= kNodeMaskCompression;
   if (tree.nodesKnown) {
     const std::uint64_t at = in.position();
@@ -119,14 +126,17 @@ void walkGrid(VdbCursor& in, const VdbContents& contents, const VdbDescriptor& g
       in.fail(at, fmt::format("unknown compression {:#x}", tree.compression));
   }
   tree.half = walkMetadata(in, "a grid's metadata");
+  bool ended = false;
   if (contents.fileVersion >= kNewTransform) {
     const std::uint64_t bytes = transformBytes(in);
     if (bytes > 0) {
       in.skip(bytes, "a grid's transform");
-      if (!instance) walkTree(in, tree);
+      ended = instance || walkTree(in, tree);
     }
   }
+  if (!contents.hasOffsets) return ended;
   in.seek(static_cast<std::uint64_t>(grid.endPos));
+  return true;
 }
 
 }  // namespace
@@ -145,9 +155,9 @@ VdbContents walkVdb(const std::filesystem::path& path) {
   if (contents.gridCount < 0 || static_cast<std::uint64_t>(contents.gridCount) > in.left() / 32)
     in.fail(countAt,
             fmt::format("{} grids in the {} bytes that are left", contents.gridCount, in.left()));
-  // Without offsets the next descriptor's place is known only after the grid was decoded.
-  const std::int32_t walked = contents.hasOffsets ? contents.gridCount : 1;
-  for (std::int32_t i = 0; i < walked; ++i) {
+  // Without offsets a grid begins where the walk over the one before it ended.
+  bool onward = true;
+  for (std::int32_t i = 0; onward && i < contents.gridCount; ++i) {
     VdbDescriptor grid;
     grid.name = in.text("a grid's name");
     grid.type = in.text("a grid's type");
@@ -156,7 +166,7 @@ VdbContents walkVdb(const std::filesystem::path& path) {
     grid.gridPos = in.value<std::int64_t>("a grid's offsets");
     grid.blockPos = in.value<std::int64_t>("a grid's offsets");
     grid.endPos = in.value<std::int64_t>("a grid's offsets");
-    if (contents.hasOffsets) walkGrid(in, contents, grid, positionsAt);
+    onward = walkGrid(in, contents, grid, positionsAt);
     contents.grids.push_back(std::move(grid));
   }
   return contents;

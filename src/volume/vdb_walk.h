@@ -19,12 +19,13 @@ struct VdbDescriptor {
 struct VdbContents {
   std::uint64_t fileSize = 0;
   std::uint32_t fileVersion = 0;
-  bool hasOffsets = false;  ///< false for a file written to a pipe: then one descriptor is walked
+  bool hasOffsets = false;  ///< false for a file written to a pipe: positions of grids are 0
   std::int32_t gridCount = 0;
+  /// All grids; of a file without offsets those before the end of one that cannot be walked.
   std::vector<VdbDescriptor> grids;
 };
 
-/// Walks header, file metadata and every grid descriptor with the metadata behind it.
+/// Walks header, file metadata and every grid: descriptor, metadata and tree (walkTree).
 /// Layout: OpenVDB 10.0.1, io/Archive (readHeader, readGridCount), io/GridDescriptor, MetaMap.
 /// @throws InputMissingError when it cannot be opened, InputError naming the byte at fault
 VdbContents walkVdb(const std::filesystem::path& path);

@@ -49,6 +49,29 @@ TEST(DamagedVdb, TheMessageSaysWhereAndWhat) {
   EXPECT_THROW(readVdb(folder.path()), InputMissingError);
 }
 
+// A writer to a pipe cannot go back to note where its grids are, and says so in byte 20. Their
+// lengths are walked all the same.
+TEST(DamagedVdb, AFileWithoutOffsetsIsWalkedToItsEnd) {
+  const test::TemporaryFolder folder;
+  std::vector<float> values(27, 2.0f);
+  const Grid density = denseToGrid("density", Vec3i(3), values, Mat4d(1));
+  const Grid heat = denseToGrid("heat", Vec3i(3), values, Mat4d(1));
+  writeVdb(folder / "whole.vdb", {density, heat});
+  std::string streamed = test::readText(folder / "whole.vdb");
+  ASSERT_EQ(streamed[20], 1);
+  streamed[20] = 0;
+  test::writeText(folder / "streamed.vdb", streamed);
+  const VdbFile file = readVdb(folder / "streamed.vdb");
+  ASSERT_EQ(file.grids.size(), 2u);
+  EXPECT_EQ(file.find("heat").activeVoxels(), 27u);
+  std::string reason;
+  EXPECT_TRUE(probeVdb(folder / "streamed.vdb", reason)) << reason;
+  for (std::size_t i = 0; i < streamed.size(); ++i) {
+    test::writeText(folder / "cut.vdb", streamed.substr(0, i));
+    EXPECT_THROW(readVdb(folder / "cut.vdb"), InputError) << i;
+  }
+}
+
 TEST(DamagedVdb, ProbingSaysWhyAndLeavesThisProcessAlone) {
   const test::TemporaryFolder folder;
   const std::string whole = smallFile(folder);
