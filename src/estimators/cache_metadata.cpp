@@ -83,6 +83,8 @@ void describeLayout(const LightFieldLayout& l, const LightCacheKey& key, Metadat
     m["bandwidth"] = exact(l.bandwidth);
     m["truncation"] = exact(l.truncation);
   }
+  // What photons count by; other ways of smoothing belong to how light is read.
+  if (l.smoothing == Smoothing::visible) m["smoothing"] = nameOf(l.smoothing);
   m["channels"] = std::to_string(l.channels);
   m["phases"] = std::to_string(l.phases);
   m["unscattered"] = std::string(1, l.unscattered ? '1' : '0');
@@ -116,6 +118,10 @@ LightFieldLayout readLayout(const MetadataReader& m) {
     if (!(l.bandwidth >= 1e-4 && l.bandwidth <= 1e4)) m.bad("bandwidth");
     if (!(l.truncation > 0)) m.bad("truncation");
     if (l.angularKernel == sphere::AngularKernel::none) m.bad("kernel");
+  }
+  if (m.has("smoothing")) {
+    l.smoothing = m.choice<Smoothing>("smoothing");
+    if (l.smoothing != Smoothing::visible) m.bad("smoothing");
   }
   l.channels = m.whole("channels", 1, 3);
   if (l.channels == 2) m.bad("channels");
@@ -228,6 +234,20 @@ const std::vector<std::int32_t>& readOrder(const std::string& path,
     seen[static_cast<std::size_t>(i)] = 1;
   }
   return order;
+}
+
+std::shared_ptr<const std::vector<float>> readWeights(const std::string& path,
+                                                      const volume::ParticleSet& points,
+                                                      const std::vector<std::int32_t>& order) {
+  const auto& stored = column<float>(path, points, kWeightsName, points.size());
+  auto weights = std::make_shared<std::vector<float>>(stored.size());
+  for (std::size_t i = 0; i < stored.size(); ++i) {
+    if (!(stored[i] >= 0.0f && stored[i] < kInfinity))
+      throw InputError(
+          path, fmt::format("has a value of '{}' that is no weight; trace it again", kWeightsName));
+    (*weights)[static_cast<std::size_t>(order[i])] = stored[i];
+  }
+  return weights;
 }
 
 std::vector<Vec3f> readLocal(const std::string& path, const volume::ParticleSet& points,

@@ -68,6 +68,13 @@ const std::vector<std::int32_t>& readOrder(const std::string& path,
 std::vector<Vec3f> readLocal(const std::string& path, const volume::ParticleSet& points,
                              const std::vector<std::int32_t>& order);
 
+/// What light of voxels counts by, LightField::weights. @throws InputError unless finite and not
+/// below zero
+std::shared_ptr<const std::vector<float>> readWeights(const std::string& path,
+                                                      const volume::ParticleSet& points,
+                                                      const std::vector<std::int32_t>& order);
+inline constexpr const char* kWeightsName = "photon_weight";
+
 /// A column of that type and size. @throws InputError
 template <class T>
 const std::vector<T>& column(const std::string& path, const volume::ParticleSet& points,

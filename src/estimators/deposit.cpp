@@ -84,7 +84,7 @@ void VoxelSink::depositTrack(const B& basis, const typename B::Along& along, con
                      // At a random place of the way: the weight may change along it.
                      const float part = m_carriers.uniform(flight, counter);
                      at = flight.origin + flight.direction * (entry + part * length);
-                     amount *= m_weight->at(voxel, at);
+                     amount *= m_weight->at(voxel, at, direction(flight, counter));
                      if (!(maxComponent(amount) > 0.0f)) return;
                    }
                    m_carriers.add(basis, along, flight, voxel, set, amount, at, counter);
@@ -101,7 +101,8 @@ void VoxelSink::depositCollision(const B& basis, const typename B::Along& along,
   std::uint32_t counter = 0;
   Rgb amount = flight.power / flight.extinctionAtEnd;
   if (m_means && !((*m_means)[static_cast<std::size_t>(voxel)] > 0.0f)) return;
-  if (m_weight) amount *= m_weight->at(static_cast<std::size_t>(voxel), p);
+  if (m_weight)
+    amount *= m_weight->at(static_cast<std::size_t>(voxel), p, direction(flight, counter));
   m_carriers.add(basis, along, flight, static_cast<std::size_t>(voxel), set, amount, p, counter);
 }
 

@@ -77,6 +77,12 @@ class VoxelSink final : public transport::FlightSink {
   template <class B>
   void depositCollision(const B& basis, const typename B::Along& along,
                         const transport::Flight& flight, int set) const;
+  // In [0, 1)^2, for a weight that looks all round.
+  Vec2f direction(const transport::Flight& flight, std::uint32_t deposit) const {
+    if (!m_weight->looksAllRound()) return Vec2f(0.0f);
+    return {m_carriers.uniform(flight, deposit ^ 0x55555555u),
+            m_carriers.uniform(flight, deposit ^ 0xaaaaaaaau)};
+  }
 
   CarrierSums m_carriers;
   Deposit m_deposit;

@@ -65,6 +65,7 @@ void writeLightCache(const std::filesystem::path& path, const LightField& field,
       voxels ? pointsOf(field.lattice, key) : pointsOf(field.particles, key);
   addSet(points, field, 0, "");
   if (field.layout.unscattered) addSet(points, field, 1, "_unscattered");
+  if (field.weights) points.add({kWeightsName, 1, *field.weights});
   Metadata& m = points.metadata;
   describeLayout(field.layout, key, m);
   if (voxels) describeLattice(field.lattice, m);
@@ -104,6 +105,8 @@ LightField readLightCache(const std::filesystem::path& path, const LightCacheKey
   LightField field;
   LightFieldLayout& l = field.layout;
   l = readLayout(m);
+  const bool weighted = l.smoothing == Smoothing::visible;
+  if (weighted && l.carrier == Carrier::particles) m.bad("smoothing");  // its lattice is gone
   field.photons = m.count("photons");
   field.farPhotons = m.count("far_photons");
   const std::size_t count = points.size();
@@ -137,6 +140,7 @@ LightField readLightCache(const std::filesystem::path& path, const LightCacheKey
     field.particles = readLocal(path.string(), points, order);
   else
     field.lattice = readLattice(m, points, order);
+  if (weighted) field.weights = readWeights(m.path(), points, order);
   return field;
 }
 

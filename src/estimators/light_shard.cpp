@@ -98,6 +98,7 @@ LightShard readHead(const MetadataReader& m) {
   shard.build = m.text("build");
   LightSums& light = shard.light;
   light.layout = readLayout(m);
+  if (light.layout.smoothing == Smoothing::visible && light.layout.holdsPower()) m.bad("smoothing");
   light.quantum = m.number("quantum");
   if (!(light.quantum > 0)) m.bad("quantum");
   light.photons = m.count("photons");
@@ -140,6 +141,7 @@ void writeLightShard(const std::filesystem::path& path, const LightShard& shard)
   volume::ParticleSet points =
       voxels ? pointsOf(light.lattice, shard.key) : pointsOf(light.particles, shard.key);
   points.add({"photon_sums", light.layout.valuesPerCarrier(), light.sums});
+  if (light.weights) points.add({kWeightsName, 1, *light.weights});
   points.metadata = describe(shard);
   const double voxelSize = voxels ? light.lattice.edge() / shard.key.space.metersPerUnit : 0.0;
   std::vector<volume::Grid> grids{volume::pointsToGrid(points, kGridName, voxelSize)};
@@ -165,6 +167,8 @@ LightShard readLightShard(const std::filesystem::path& path) {
     return shard;
   }
   light.lattice = readLattice(m, points, order);
+  if (light.layout.smoothing == Smoothing::visible)
+    light.weights = readWeights(path.string(), points, order);
   if (light.layout.carrier == Carrier::particles) {
     const volume::ParticleSet particles =
         volume::gridToPoints(pointGrid(file, kParticlesName, path.string()));

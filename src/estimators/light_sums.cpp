@@ -64,7 +64,7 @@ class Tracing {
     const CarrierSums carriers(medium, lights, m_light.layout, view, options.key, m_sums);
     if (!m_light.layout.holdsPower()) {
       std::optional<VisibleWeight> weight;
-      if (m_light.weights) weight.emplace(medium, m_light.lattice, view);
+      if (m_light.weights) weight.emplace(medium, m_light.lattice, m_light.layout, view);
       VoxelSink sink(carriers, m_light.layout.deposit, m_light.lattice, weight ? &*weight : nullptr,
                      m_light.weights.get());
       return trace(medium, lights, options, sink);
@@ -136,10 +136,10 @@ LightSums traceLightSums(const Medium& medium, const transport::LightList& light
   }
   light.quantum = quantumOf(medium, lights, layout.holdsPower());
   if (!layout.holdsPower()) light.lattice = latticeOf(medium, layout, view);
-  if (weighsByTheEye(layout)) {
+  if (layout.smoothing == Smoothing::visible) {
     light.weights = std::move(weights);
     if (!light.weights || light.weights->size() != light.lattice.size())
-      light.weights = eyeWeights(medium, light.lattice, view);
+      light.weights = visibleWeights(medium, light.lattice, layout, view);
   }
   statistics = Tracing(light, checkpoint, part).run(medium, lights, view, options);
   return light;
@@ -169,17 +169,24 @@ LightField toField(LightSums light) {
   const double volume = field.layout.holdsPower() ? 1.0 : edge * edge * edge;
   const double worth =
       1.0 / (static_cast<double>(std::max<std::uint64_t>(1, light.photons)) * volume);
+  const std::vector<float>* weights = field.weights.get();
+  const auto stride = static_cast<std::size_t>(field.layout.valuesPerCarrier());
   field.values.resize(light.sums.size());
   parallelFor(field.values.size(), 1 << 16, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i)
-      field.values[i] =
-          static_cast<float>(static_cast<double>(light.sums[i]) * light.quantum * worth);
+    for (std::size_t i = begin; i < end; ++i) {
+      const double weight = weights ? static_cast<double>((*weights)[i / stride]) : 1.0;
+      if (weight > 0)  // nothing was left elsewhere
+        field.values[i] =
+            static_cast<float>(static_cast<double>(light.sums[i]) * light.quantum * worth / weight);
+    }
   });
   light.sums = {};
   if (field.layout.carrier == Carrier::particles && !field.layout.holdsPower()) {
     // Track lengths are gathered on voxels and read off at the particles (METHOD.md section 5.4).
     field.values = sampleAtParticles(field, field.particles);
     field.lattice = {};
+    field.layout.smoothing = Smoothing::twicing;
+    field.weights.reset();
   }
   return field;
 }

@@ -89,7 +89,7 @@ class ResolvedField final : public InscatterSource {
       : m_phases(static_cast<int>(medium.phases().size())),
         m_unscattered(field.layout.unscattered),
         m_power(field.layout.holdsPower()),
-        m_weighted(weighsByTheEye(field.layout)) {
+        m_weighted(field.layout.smoothing == Smoothing::visible) {
     SupportLattice own;
     if (field.layout.carrier == Carrier::particles)
       own = SupportLattice(medium, field.layout.lightVoxel * medium.voxelEdge(), 1);
@@ -103,11 +103,14 @@ class ResolvedField final : public InscatterSource {
     const auto phases = static_cast<std::size_t>(m_phases);
     m_fields.resize(sets * phases);
     std::shared_ptr<const std::vector<float>> weights = field.weights;
-    if (m_weighted && !weights) weights = eyeWeights(medium, lattice, view);
+    if (m_weighted && !weights) weights = visibleWeights(medium, lattice, field.layout, view);
     for (std::size_t k = 0; k < phases; ++k) {
       const PhaseReader reader(field.layout, medium, static_cast<int>(k));
       for (std::size_t set = 0; set < sets; ++set) {
         Colours folded = foldPhase(field, view, set, reader, key);
+        if (m_weighted)
+          for (std::size_t i = 0; i < folded.size(); ++i)
+            folded[i] *= (*weights)[i];
         m_read.count(folded);
         if (m_weighted)
           folded = smoothWeighted(lattice, folded, *weights, field.layout);
@@ -172,10 +175,11 @@ class ResolvedField final : public InscatterSource {
 
 }  // namespace
 
-std::shared_ptr<const std::vector<float>> eyeWeights(const Medium& medium,
-                                                     const SupportLattice& lattice,
-                                                     const View& view) {
-  const VisibleWeight weight(medium, lattice, view);
+std::shared_ptr<const std::vector<float>> visibleWeights(const Medium& medium,
+                                                         const SupportLattice& lattice,
+                                                         const LightFieldLayout& layout,
+                                                         const View& view) {
+  const VisibleWeight weight(medium, lattice, layout, view);
   auto weights = std::make_shared<std::vector<float>>(lattice.size());
   parallelFor(weights->size(), 256, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i)

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "photosphere/core/sampling.h"
 #include "photosphere/transport/tracking.h"
 
 namespace photosphere::estimators {
@@ -16,6 +17,9 @@ constexpr float kStepDepth = 4.0f;  // of a step that begins in thin smoke
 constexpr float kHidden = 0.02f;
 // Lines toward the eye along each edge of a voxel's face that is turned to it.
 constexpr double kLines = 4;
+// Directions all round, and lines toward each.
+constexpr int kRings = 4, kSectors = 4;
+constexpr double kLinesAllRound = 2;
 // Voxel edges from the eye within which lines are not parallel, points along each edge of such a
 // voxel, optical depth of a step through it, and transmittance below which nothing is seen.
 constexpr double kNearby = 2.0;
@@ -32,17 +36,17 @@ float VisibleWeight::wayOut(std::size_t voxel, const Vec3f& p, const Vec3f& d) c
 }
 
 float VisibleWeight::wayToEye(const Vec3f& p, const Vec3f& d) const {
-  if (!m_view.hasEye) return kInfinity;
-  return static_cast<float>(std::max(0.0, glm::dot(m_view.eye - Vec3d(p), Vec3d(d))));
+  if (!m_view || !m_view->hasEye) return kInfinity;
+  return static_cast<float>(std::max(0.0, glm::dot(m_view->eye - Vec3d(p), Vec3d(d))));
 }
 
-float VisibleWeight::at(std::size_t voxel, const Vec3f& p) const {
+float VisibleWeight::at(std::size_t voxel, const Vec3f& p, const Vec2f& u) const {
   const float sigma = m_medium.extinction(p);
-  if (!(sigma > 0.0f)) return 0.0f;
-  const Vec3f d = m_view.toEye(p);
+  if (!(sigma > 0.0f)) return m_everywhere;
+  const Vec3f d = m_view ? m_view->toEye(p) : sampleSphere(u);
   const float hidden = depth(p, d, std::min(wayOut(voxel, p, d) + beyond(), wayToEye(p, d)));
-  if (hidden >= kOpaque) return 0.0f;
-  return sigma * static_cast<float>(m_lattice.edge()) * std::exp(-hidden);
+  if (hidden >= kOpaque) return m_everywhere;
+  return m_everywhere + sigma * static_cast<float>(m_lattice.edge()) * std::exp(-hidden);
 }
 
 template <class Visit>
@@ -73,10 +77,22 @@ float VisibleWeight::depth(const Vec3f& p, const Vec3f& d, float length) const {
 }
 
 float VisibleWeight::mean(std::size_t voxel) const {
+  Rng rng = linesOf(voxel);
+  if (!m_view) {
+    float sum = 0.0f;
+    for (int y = 0; y < kRings; ++y)
+      for (int x = 0; x < kSectors; ++x) {
+        const Vec2f u = (Vec2f(x, y) + rng.uniform2()) / Vec2f(kSectors, kRings);
+        sum += meanFromAfar(voxel, sampleSphere(u), kLinesAllRound, rng).seen;
+      }
+    return m_everywhere + sum / static_cast<float>(kRings * kSectors);
+  }
   const double edge = m_lattice.edge();
-  const bool nearby =
-      m_view.hasEye && glm::length(m_view.eye - Vec3d(m_lattice.center(voxel))) < kNearby * edge;
-  return nearby ? meanNearby(voxel) : meanFromAfar(voxel);
+  const Vec3f center = m_lattice.center(voxel);
+  const bool nearby = m_view->hasEye && glm::length(m_view->eye - Vec3d(center)) < kNearby * edge;
+  const Mean mean =
+      nearby ? meanNearby(voxel, rng) : meanFromAfar(voxel, m_view->toEye(center), kLines, rng);
+  return mean.seen < kHidden * mean.open ? 0.0f : mean.seen;
 }
 
 Rng VisibleWeight::linesOf(std::size_t voxel) const {
@@ -86,18 +102,17 @@ Rng VisibleWeight::linesOf(std::size_t voxel) const {
               static_cast<std::uint64_t>(cell.z) << 42};
 }
 
-float VisibleWeight::meanFromAfar(std::size_t voxel) const {
+// The integral of sigma_t T over the voxel is that over the faces turned to the eye of T where a
+// line leaves, less T where it entered.
+VisibleWeight::Mean VisibleWeight::meanFromAfar(std::size_t voxel, const Vec3f& d, double lines,
+                                                Rng& rng) const {
   const Vec3f center = m_lattice.center(voxel);
   const auto edge = static_cast<float>(m_lattice.edge());
-  const Vec3f d = m_view.toEye(center);
   const Vec3f across = glm::abs(d);
-  Rng rng = linesOf(voxel);
-  float sum = 0.0f, open = 0.0f;
-  // The integral of sigma_t T over the voxel is that over the faces turned to the eye of T where a
-  // line leaves, less T where it entered.
+  Mean mean;
   for (int axis = 0; axis < 3; ++axis) {
     const int rows =
-        static_cast<int>(std::ceil(kLines * std::sqrt(static_cast<double>(across[axis]))));
+        static_cast<int>(std::ceil(lines * std::sqrt(static_cast<double>(across[axis]))));
     const float share = across[axis] / static_cast<float>(rows * rows);
     for (int i = 0; i < rows * rows; ++i) {
       const Vec2f u = (Vec2f(i % rows, i / rows) + rng.uniform2()) / static_cast<float>(rows);
@@ -109,28 +124,27 @@ float VisibleWeight::meanFromAfar(std::size_t voxel) const {
       const float in = wayOut(voxel, p, -d);
       const float absorbed = share * -std::expm1(-depth(p - d * in, d, in));
       if (!(absorbed > 0.0f)) continue;
-      open += absorbed;
+      mean.open += absorbed;
       const float hidden = depth(p, d, std::min(beyond(), wayToEye(p, d)));
-      if (hidden < kOpaque) sum += std::exp(-hidden) * absorbed;
+      if (hidden < kOpaque) mean.seen += std::exp(-hidden) * absorbed;
     }
   }
-  return sum < kHidden * open ? 0.0f : sum;
+  return mean;
 }
 
 // A line from the eye through a random point of the voxel has sigma_t T r^2, integrated over what
 // it has of the voxel, for the r^2 of the same: the mean over points of their quotient is that of
 // sigma_t T over the volume, and finds the little of thick smoke that an eye inside it sees.
-float VisibleWeight::meanNearby(std::size_t voxel) const {
+VisibleWeight::Mean VisibleWeight::meanNearby(std::size_t voxel, Rng& rng) const {
   const Vec3f center = m_lattice.center(voxel);
   const auto edge = static_cast<float>(m_lattice.edge());
-  Rng rng = linesOf(voxel);
-  float sum = 0.0f, open = 0.0f;
+  Mean mean;
   for (int i = 0; i < kPoints * kPoints * kPoints; ++i) {
     const Vec3f cell(i % kPoints, i / kPoints % kPoints, i / (kPoints * kPoints));
     const Vec2f u = rng.uniform2();
     const Vec3f p =
         center + edge * ((cell + Vec3f(u, rng.uniform())) / static_cast<float>(kPoints) - 0.5f);
-    const Vec3f d = m_view.toEye(p);
+    const Vec3f d = m_view->toEye(p);
     const float away = wayToEye(p, d);
     const float forth = std::min(away, wayOut(voxel, p, d));
     const float nearest = away - forth;
@@ -146,11 +160,11 @@ float VisibleWeight::meanNearby(std::size_t voxel) const {
     const float whole = (farthest * farthest * farthest - nearest * nearest * nearest) / 3.0f;
     if (!(seen > 0.0f) || !(whole > 0.0f)) continue;
     const float part = edge * seen / whole / static_cast<float>(kPoints * kPoints * kPoints);
-    open += part;
+    mean.open += part;
     const float hidden = depth(p + d * forth, d, std::min(beyond(), nearest));
-    if (hidden < kOpaque) sum += std::exp(-hidden) * part;
+    if (hidden < kOpaque) mean.seen += std::exp(-hidden) * part;
   }
-  return sum < kHidden * open ? 0.0f : sum;
+  return mean;
 }
 
 }  // namespace photosphere::estimators

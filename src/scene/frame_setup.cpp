@@ -121,8 +121,7 @@ void heedParallax(const SceneFile& scene, FrameSetup& setup) {
   if (scene.estimator.text("type") != "photosphere" || l.basis != estimators::Basis::view ||
       parallax <= kSmallParallax)
     return;
-  const bool chosen =
-      scene.estimator.text("basis") == "auto" && l.smoothing != estimators::Smoothing::visible;
+  const bool chosen = scene.estimator.text("basis") == "auto";
   if (chosen) l.basis = estimators::Basis::histogram;
   setup.notes.push_back(fmt::format(
       "while the shutter is open the smoke sees the camera move by {:.2g} degrees: light is {}",
@@ -148,17 +147,18 @@ bool isThick(const FrameSetup& setup) {
   return setup.medium->majorants().shareAbove(static_cast<float>(kThickVoxel / edge)) > kThickShare;
 }
 
-// Weights by what the camera sees serve voxels of any depth.
+// Weights by what is seen serve voxels of any depth.
 void chooseSmoothing(const ParamValues& e, FrameSetup& setup) {
   using namespace estimators;
   LightFieldLayout& l = setup.layout;
-  if (e.text("type") != "photosphere" || e.given("smoothing") || l.basis != Basis::view ||
-      l.carrier != Carrier::voxels || setup.medium->bounds().empty() || !isThick(setup))
+  if (e.text("type") != "photosphere" || e.given("smoothing") || !e.text("cache").empty() ||
+      l.holdsPower() || setup.medium->bounds().empty() || !isThick(setup))
     return;
   l.smoothing = Smoothing::visible;
   setup.notes.push_back(
-      "the smoke is many mean free paths deep in each light voxel: photons count by what the "
-      "camera sees of them (estimator.smoothing = \"visible\")");
+      fmt::format("the smoke is many mean free paths deep in each light voxel: photons count by "
+                  "what {} of them (estimator.smoothing = \"visible\")",
+                  l.basis == Basis::view ? "the camera sees" : "is seen from all round"));
 }
 
 void chooseLightVoxel(const ParamValues& e, FrameSetup& setup) {

@@ -56,7 +56,8 @@ estimators::LightField readField(const SceneFile& scene, bool allowStale, FrameS
   // How light is read is the scene's to say; kernel and bandwidth were used up where they spread
   // it.
   estimators::LightFieldLayout& layout = field.layout;
-  layout.smoothing = setup.layout.smoothing;
+  if (scene.estimator.given("smoothing") || layout.smoothing != estimators::Smoothing::visible)
+    layout.smoothing = setup.layout.smoothing;
   layout.merge = setup.layout.merge;
   layout.evaluate = setup.layout.evaluate;
   layout.directions = setup.layout.directions;
@@ -115,8 +116,8 @@ estimators::LightSums lightSums(const RenderRequest& request, FrameSetup& setup,
         estimators::photonsOf(*request.shard, setup.photons);
   estimators::LightSums light = estimators::traceLightSums(
       *setup.medium, setup.lights, setup.layout, setup.view, setup.particles, options, traced,
-      setup.eyeWeights, request.checkpoint, part);
-  setup.eyeWeights = light.weights;
+      setup.visibleWeights, request.checkpoint, part);
+  setup.visibleWeights = light.weights;
   addTraced(traced, statistics);
   statistics.photonsStored += storedPhotons(setup.layout, traced);
   if (light.farPhotons > 0)

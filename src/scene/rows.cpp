@@ -172,9 +172,9 @@ std::span<const Param> estimatorParams() {
        .unit = "",
        .defaultText = "twicing",
        .help = "of fluence on voxels: sharpened by a second blur, plain, weighted by density, the "
-               "mean of plain and density, or weighted by what the camera sees of the smoke where "
-               "a photon passes; where it is not given, the last for smoke that is many mean free "
-               "paths deep in a light voxel, if basis is view",
+               "mean of plain and density, or weighted by what is seen of the smoke where a photon "
+               "passes, by the camera (basis view) or from all round; where it is not given, the "
+               "last for smoke that is many mean free paths deep in a light voxel",
        .choices = "twicing|plain|density|mean|visible"},
       {.name = "carrier",
        .type = ParamType::text,

@@ -132,13 +132,22 @@ INSTANTIATE_TEST_SUITE_P(Estimators, SameBitsOf, ::testing::ValuesIn(kWays),
                          [](const auto& way) { return std::string(way.param.name); });
 
 TEST_F(SameBits, ThroughALightCache) {
-  for (const char* basis : {"histogram", "spherical_harmonics"}) {
-    const std::vector<std::string> set{"-s", std::string("estimator.basis=") + basis};
+  using Sets = std::vector<std::string>;
+  const Sets usual, opaque{"-s", "volume.0.density_scale=20000", "-s", "estimator.light_voxel=2"};
+  for (const auto& [basis, smoke] : {std::pair<std::string, Sets>{"histogram", usual},
+                                     {"spherical_harmonics", usual},
+                                     {"histogram", opaque},
+                                     {"spherical_harmonics", opaque}}) {
+    Sets set{"-s", "estimator.basis=" + basis};
+    set.insert(set.end(), smoke.begin(), smoke.end());
     ASSERT_EQ(run({"trace", "scene.toml", "-o", "l.vdb", "--frames", "2"}, set).exitCode, 0);
-    ASSERT_EQ(
-        run({"render", "scene.toml", "-o", "a.exr", "--frames", "2", "--float"}, set).exitCode, 0);
+    const RunResult whole =
+        run({"render", "scene.toml", "-o", "a.exr", "--frames", "2", "--float"}, set);
+    ASSERT_EQ(whole.exitCode, 0) << whole.err;
+    EXPECT_EQ(whole.err.find("from all round") != std::string::npos, !smoke.empty()) << whole.err;
     ASSERT_EQ(run({"render", "scene.toml", "-o", "b.exr", "--frames", "2", "--float", "-s",
-                   "estimator.cache=l.vdb"})
+                   "estimator.cache=l.vdb"},
+                  smoke)
                   .exitCode,
               0);
     expectSamePixels("a.exr", "b.exr");
@@ -180,7 +189,10 @@ TEST_F(Shards, MergeInAnyOrderToTheBitsOfOneTrace) {
   for (const Layout& layout :
        {Layout{"smoke.####.vdb", {}},
         Layout{"smoke.####.vdb", {"-s", "estimator.basis=spherical_harmonics"}},
+        Layout{"smoke.####.vdb", {"-s", "estimator.smoothing=visible"}},
         Layout{"points.vdb", {"-s", "estimator.carrier=particles"}},
+        Layout{"points.vdb",
+               {"-s", "estimator.carrier=particles", "-s", "estimator.smoothing=visible"}},
         Layout{"points.vdb",
                {"-s", "estimator.carrier=particles", "-s", "estimator.deposit=collision", "-s",
                 "estimator.representative=mean"}}}) {

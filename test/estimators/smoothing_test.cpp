@@ -114,28 +114,50 @@ TEST(FluenceSmoothing, FewPhotonsInBinsHaveTheMeanOfMany) {
   expectTheMeanOfMany(0.95, Basis::histogram, 24, 2'000'000, 0.05);
 }
 
-// A voxel's mean says little of light that enters and leaves within a hundredth of it.
-TEST(FluenceSmoothing, WhatTheEyeSeesOfOpaqueVoxelsIsKept) {
-  if (kSanitized) GTEST_SKIP() << "a mean of many paths, too slow under a sanitizer";
-  for (const double depth : {60.0, 3000.0}) {
-    const TestScene scene = sphereScene(depth, 0.95, 0.0, 16, 32);
-    const Truth truth = pathTruth(scene, 100);
-    std::map<Smoothing, double> ratio;
-    for (const Smoothing way : {Smoothing::twicing, Smoothing::visible}) {
-      LightFieldLayout layout;
-      layout.channels = 1;
-      layout.smoothing = way;
-      layout.radius = 0.5 * layout.lightVoxel * scene.medium->voxelEdge();
-      const PhotosphereFrame frame = renderPhotosphere(scene, layout, 200'000, 5);
-      const LayerError e = truth.errorOf(frame.layers, &render::FrameLayers::multiple);
-      std::printf("  %g %-8s mean %.4f  relMSE %.5f\n", depth, std::string(nameOf(way)).c_str(),
-                  e.meanRatio, e.relMse);
-      ratio[way] = e.meanRatio;
-    }
-    EXPECT_LT(ratio[Smoothing::twicing], 0.9) << depth;
-    EXPECT_NEAR(ratio[Smoothing::visible], 1.0, 0.08) << depth;
+std::vector<Vec3f> pointsInBall(int count) {
+  Rng rng(RandomKey::fromSeed(9, 0), RandomStream::test, 0);
+  std::vector<Vec3f> points;
+  while (points.size() < static_cast<std::size_t>(count)) {
+    const Vec3f p = Vec3f(rng.uniform(), rng.uniform(), rng.uniform()) - 0.5f;
+    if (glm::length(p) < 0.5f) points.push_back(p);
   }
+  return points;
 }
+
+class OpaqueVoxels : public ::testing::TestWithParam<double> {};
+
+// A voxel's mean says little of light that enters and leaves within a hundredth of it.
+TEST_P(OpaqueVoxels, KeepWhatIsSeenOfThem) {
+  if (kSanitized) GTEST_SKIP() << "a mean of many paths, too slow under a sanitizer";
+  TestScene scene = sphereScene(GetParam(), 0.95, 0.0, 16, 32);
+  scene.particles = pointsInBall(20'000);
+  const Truth truth = pathTruth(scene, 100);
+  const auto meanOf = [&](LightFieldLayout layout, Smoothing way) {
+    layout.channels = 1;
+    layout.smoothing = way;
+    layout.radius = 0.5 * layout.lightVoxel * scene.medium->voxelEdge();
+    const PhotosphereFrame frame = renderPhotosphere(scene, layout, 200'000, 5);
+    const LayerError e = truth.errorOf(frame.layers, &render::FrameLayers::multiple);
+    std::printf(
+        "  %s %s %s %-8s mean %.4f  relMSE %.5f\n", std::string(nameOf(layout.basis)).c_str(),
+        std::string(nameOf(layout.carrier)).c_str(), std::string(nameOf(layout.evaluate)).c_str(),
+        std::string(nameOf(way)).c_str(), e.meanRatio, e.relMse);
+    return e.meanRatio;
+  };
+  LightFieldLayout view, bins, harmonics, steps, particles;
+  bins.basis = steps.basis = particles.basis = Basis::histogram;
+  harmonics.basis = Basis::sphericalHarmonics;
+  steps.evaluate = Evaluate::perStep;
+  particles.carrier = Carrier::particles;
+  for (const LightFieldLayout& layout : {view, bins, harmonics, particles}) {
+    EXPECT_LT(meanOf(layout, Smoothing::twicing), 0.9);
+    EXPECT_NEAR(meanOf(layout, Smoothing::visible), 1.0, 0.08);
+  }
+  // Every step reads voxels that were divided by their weights one by one.
+  EXPECT_NEAR(meanOf(steps, Smoothing::visible), 1.0, 0.15);
+}
+
+INSTANTIATE_TEST_SUITE_P(FluenceSmoothing, OpaqueVoxels, ::testing::Values(60.0, 3000.0));
 
 // An eye that flies into thick smoke goes on seeing it: in a furnace, as bright as outside.
 TEST(FluenceSmoothing, WhatAnEyeInsideSeesIsKept) {
@@ -173,14 +195,17 @@ TEST(FluenceSmoothing, WhatTheEyeSeesOfCollisionsIsKept) {
   EXPECT_NEAR(truth.errorOf(frame.layers, &render::FrameLayers::multiple).meanRatio, 1.0, 0.08);
 }
 
-TEST(FluenceSmoothing, WhatTheEyeSeesNeedsAnEye) {
+TEST(FluenceSmoothing, WhatIsSeenIsOfFluenceOnVoxels) {
   LightFieldLayout layout;
   layout.smoothing = Smoothing::visible;
-  EXPECT_NO_THROW(checkLayout(layout));
-  for (const Basis basis : {Basis::histogram, Basis::sphericalHarmonics}) {
+  for (const Basis basis : {Basis::view, Basis::histogram, Basis::sphericalHarmonics}) {
     layout.basis = basis;
-    EXPECT_THROW(checkLayout(layout), ConfigError);
+    EXPECT_NO_THROW(checkLayout(layout));
   }
+  layout.carrier = Carrier::particles;
+  EXPECT_NO_THROW(checkLayout(layout));
+  layout.deposit = Deposit::collision;
+  EXPECT_THROW(checkLayout(layout), ConfigError);
 }
 
 TEST(FluenceSmoothing, IsOfVoxelsResolvedPerView) {

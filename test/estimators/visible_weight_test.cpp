@@ -19,13 +19,15 @@ struct Agreement {
   double ratio = 0, off = 0;
 };
 
-Agreement agreement(double depth, const View& view) {
+Agreement agreement(double depth, const View& view, Basis basis = Basis::view) {
   MediumOptions options;
   options.extinction = depth;
   const transport::Medium medium = makeMedium(sampledVolume(
       1.0, 16, options, [](const Vec3d& p) { return glm::length(p) < 0.35 ? 1.0 : 0.0; }));
   const transport::SupportLattice lattice(medium, 2 * medium.voxelEdge(), 1);
-  const VisibleWeight weight(medium, lattice, view);
+  LightFieldLayout layout;
+  layout.basis = basis;
+  const VisibleWeight weight(medium, lattice, layout, view);
   double all = 0, expected = 0, off = 0;
   for (std::size_t v = 0; v < lattice.size(); ++v) {
     Rng rng(RandomKey::fromSeed(4, 0), RandomStream::test, v);
@@ -33,8 +35,8 @@ Agreement agreement(double depth, const View& view) {
     const int points = kSanitized ? 200 : 2000;
     for (int i = 0; i < points; ++i) {
       const Vec3f u(rng.uniform(), rng.uniform(), rng.uniform());
-      sum += static_cast<double>(
-          weight.at(v, lattice.center(v) + (u - 0.5f) * static_cast<float>(lattice.edge())));
+      sum += static_cast<double>(weight.at(
+          v, lattice.center(v) + (u - 0.5f) * static_cast<float>(lattice.edge()), rng.uniform2()));
     }
     const auto mean = static_cast<double>(weight.mean(v));
     all += mean;
@@ -57,6 +59,16 @@ TEST(VisibleWeight, MeanIsThatOfManyPoints) {
         EXPECT_LT(found.off, depth > 1 ? 0.2 : 0.08) << depth << ' ' << toEye.x;
       }
     }
+}
+
+TEST(VisibleWeight, MeanIsThatOfManyPointsAllRound) {
+  for (const double depth : {1.0, 60.0, 3000.0}) {
+    const Agreement found = agreement(depth, View(), Basis::histogram);
+    EXPECT_NEAR(found.ratio, 1.0, depth > 1 ? 0.06 : 0.015) << depth;
+    if (!kSanitized) {
+      EXPECT_LT(found.off, depth > 1 ? 0.25 : 0.08) << depth;
+    }
+  }
 }
 
 // From beside the smoke into it. In the thickest smoke points that an eye inside it sees are so few
@@ -86,7 +98,9 @@ TEST(VisibleWeight, AnEyeInOpaqueSmokeSeesWhatIsAroundIt) {
   const transport::SupportLattice lattice(medium, 2 * medium.voxelEdge(), 1);
   View view;
   view.eye = Vec3d(0.07, 0.05, 0.06);  // the middle of a voxel, all but that
-  const VisibleWeight weight(medium, lattice, view);
+  LightFieldLayout layout;
+  layout.basis = Basis::view;
+  const VisibleWeight weight(medium, lattice, layout, view);
   double sum = 0;
   for (std::size_t v = 0; v < lattice.size(); ++v)
     sum += static_cast<double>(weight.mean(v));

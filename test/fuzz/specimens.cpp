@@ -145,10 +145,13 @@ std::string lightCache(estimators::Carrier carrier) {
   field.layout.channels = 1;
   field.layout.radius = field.layout.depositRadius = 0.5;
   const std::vector<Vec3i> voxels{{1, 2, 3}, {1, 2, 4}, {9, 2, 3}};
-  if (carrier == estimators::Carrier::voxels)
+  if (carrier == estimators::Carrier::voxels) {
     field.lattice = transport::SupportLattice(Vec3d(-1), 0.25, Vec3i(2, 1, 1), voxels);
-  else
+    field.layout.smoothing = estimators::Smoothing::visible;
+    field.weights = std::make_shared<const std::vector<float>>(3, 0.5f);
+  } else {
     field.particles = {Vec3f(0.1f), Vec3f(0.2f), Vec3f(0.7f)};
+  }
   for (int i = 0; i < 3 * 8; ++i)
     field.values.push_back(static_cast<float>(i));
   const TemporaryFolder folder;
@@ -168,6 +171,9 @@ void addVolumes(std::vector<Specimen>& all) {
     all.push_back({target, "smoke_and_points", test::readText(folder / "a.vdb")});
   volume::writeVdb(folder / "b.vdb", {someSmoke(), volume::renamed(someSmoke(), "again")});
   all.push_back({"vdb", "smoke", test::readText(folder / "b.vdb")});
+  std::string streamed = test::readText(folder / "b.vdb");
+  streamed[20] = 0;  // says that the file lacks the offsets of its grids
+  all.push_back({"vdb.walk", "without_offsets", streamed});
   all.push_back({"light_cache", "voxels", lightCache(estimators::Carrier::voxels)});
   all.push_back({"light_cache", "particles", lightCache(estimators::Carrier::particles)});
 }

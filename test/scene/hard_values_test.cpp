@@ -65,14 +65,17 @@ TEST_F(HardValues, LightVoxelsFitTheSmoke) {
   EXPECT_FALSE(notes(setUp(usual), "estimator.light_voxel"));
   const std::string opaque = "volume.0.density_scale=3000";
   const FrameSetup thick =
-      setUp(usual, {opaque, "estimator.basis=spherical_harmonics", "estimator.order=0"});
+      setUp(usual, {opaque, "estimator.smoothing=twicing", "estimator.basis=spherical_harmonics",
+                    "estimator.order=0"});
   EXPECT_EQ(thick.layout.lightVoxel, 1);
   EXPECT_TRUE(notes(thick, "several mean free paths deep"));
-  // For one eye it is enough to weigh light by what that sees.
-  const FrameSetup seen = setUp(usual, {opaque});
-  EXPECT_EQ(seen.layout.smoothing, estimators::Smoothing::visible);
-  EXPECT_EQ(seen.layout.lightVoxel, 2);
-  EXPECT_TRUE(notes(seen, "estimator.smoothing"));
+  // It is enough to weigh light by what is seen.
+  for (const char* basis : {"view", "histogram", "spherical_harmonics"}) {
+    const FrameSetup seen = setUp(usual, {opaque, fmt::format("estimator.basis={}", basis)});
+    EXPECT_EQ(seen.layout.smoothing, estimators::Smoothing::visible);
+    EXPECT_EQ(seen.layout.lightVoxel, 2);
+    EXPECT_TRUE(notes(seen, "estimator.smoothing"));
+  }
   EXPECT_EQ(setUp(usual).layout.smoothing, estimators::Smoothing::twicing);
   EXPECT_EQ(setUp(usual, {opaque, "estimator.smoothing=twicing"}).layout.smoothing,
             estimators::Smoothing::twicing);

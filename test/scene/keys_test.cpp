@@ -319,10 +319,10 @@ TEST_F(ShotTest, TheViewIsThatOfTheMiddleOfTheShutter) {
       setUpFrame(scene({fast, "camera.shutter=[-6, 6]", "estimator.basis=view"}), 3);
   EXPECT_EQ(asked.layout.basis, estimators::Basis::view);
   EXPECT_EQ(asked.notes.size(), 1u);
-  // What one eye sees is of one eye, too.
+  // What is seen of opaque smoke is seen from all round, too.
   const FrameSetup seen =
       setUpFrame(scene({fast, "camera.shutter=[-6, 6]", "estimator.smoothing=visible"}), 3);
-  EXPECT_EQ(seen.layout.basis, estimators::Basis::view);
+  EXPECT_EQ(seen.layout.basis, estimators::Basis::histogram);
   EXPECT_EQ(seen.layout.smoothing, estimators::Smoothing::visible);
 }
 

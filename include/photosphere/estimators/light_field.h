@@ -28,8 +28,9 @@ enum class Smoothing {
   plain,    ///< weighted means of fluence, which lose light where the smoke is lit at its edge
   density,  ///< of fluence times extinction, over those of extinction, which gain light there
   mean,     ///< the mean of `plain` and `density`
-  visible,  ///< of fluence times what the eye sees of the smoke where a photon passes, over those
-            ///< of the latter: right where a light voxel is many mean free paths deep (Basis::view)
+  visible,  ///< of fluence times what is seen of the smoke where a photon passes, over those of the
+            ///< latter, by the eye (Basis::view) or from all round: right where a light voxel is
+            ///< many mean free paths deep
 };
 /// What stands for the directions of a bin (Min & Ihm 2010, figure 5).
 enum class Representative {
@@ -99,21 +100,16 @@ struct LightFieldLayout {
   bool holdsPower() const { return carrier == Carrier::particles && deposit == Deposit::collision; }
 };
 
-/// Whether photons deposit what the eye sees of them (Smoothing::visible).
-inline bool weighsByTheEye(const LightFieldLayout& l) {
-  return l.smoothing == Smoothing::visible && l.basis == Basis::view;
-}
-
 /// Values on carriers, [carrier][set][bin][channel]. Histogram: fluence rate that arrives in the
 /// bin [W m^-2], or power [W] (holdsPower). Spherical harmonics: the same light times Y_lm of the
-/// direction it travels in. View: times the phase function toward the eye [1/sr], and for
-/// weighsByTheEye times the weight [1] whose means are `weights`.
+/// direction it travels in. View: times the phase function toward the eye [1/sr].
 struct LightField {
   LightFieldLayout layout;
   transport::SupportLattice lattice;  ///< light voxels; the carriers themselves for Carrier::voxels
   std::vector<Vec3f> particles;       ///< positions, local space [m]; Carrier::particles
   std::vector<float> values;
-  /// eyeWeights of the lattice, for weighsByTheEye; nothing = `resolve` makes them itself.
+  /// What the values of voxels count by for Smoothing::visible, visibleWeights; nothing = `resolve`
+  /// makes them.
   std::shared_ptr<const std::vector<float>> weights;
   std::uint64_t photons = 0;     ///< emitted in all
   std::uint64_t farPhotons = 0;  ///< collisions without a particle in range, given to the nearest
@@ -147,12 +143,14 @@ LightField traceLightField(const transport::Medium& medium, const transport::Lig
 double automaticRadius(const transport::Medium& medium, const LightFieldLayout& layout,
                        std::uint64_t photons);
 
-/// Mean over each voxel of the lattice of extinction times transmittance toward the eye times the
-/// voxel's edge [1]: what a field that weighsByTheEye is divided by. They depend on the smoke and
-/// the view alone, so that fields of other photons share them.
-std::shared_ptr<const std::vector<float>> eyeWeights(const transport::Medium& medium,
-                                                     const transport::SupportLattice& lattice,
-                                                     const View& view);
+/// Mean over each voxel of the lattice of extinction times transmittance toward the eye, or in the
+/// mean of all directions (any basis but Basis::view), times the voxel's edge [1]: what photons
+/// count by for Smoothing::visible. They depend on the smoke and the view alone, so that fields of
+/// other photons share them.
+std::shared_ptr<const std::vector<float>> visibleWeights(const transport::Medium& medium,
+                                                         const transport::SupportLattice& lattice,
+                                                         const LightFieldLayout& layout,
+                                                         const View& view);
 
 /// Resolves the field for one view: histogram and phase fold into one colour per carrier and phase
 /// function, which is then smoothed and laid out for lookups (METHOD.md sections 5.1 to 5.3).

@@ -18,7 +18,8 @@ struct LightSums {
   /// particles.
   transport::SupportLattice lattice;
   std::vector<Vec3f> particles;  ///< positions, local space [m]; Carrier::particles
-  /// eyeWeights of the lattice, for weighsByTheEye: nothing is left where they are 0.
+  /// visibleWeights of the lattice, for Smoothing::visible, which `sums` are times of: nothing is
+  /// left where they are 0.
   std::shared_ptr<const std::vector<float>> weights;
   std::vector<std::int64_t> sums;                  ///< [voxel or particle][set][bin][channel]
   double quantum = 1.0;                            ///< worth of one unit [W m], or [W] (holdsPower)
@@ -31,8 +32,8 @@ struct LightSums {
 };
 
 /// Traces the photons that the options name and sums what they leave.
-/// @param weights     for weighsByTheEye: those of an earlier trace of the same smoke, lattice and
-///                    view; nothing = they are made
+/// @param weights     for Smoothing::visible: those of an earlier trace of the same smoke, lattice
+///                    and view; nothing = they are made
 /// @param checkpoint  goes on from its part `light` and keeps that while tracing; nullptr = no
 /// @param part        tells parts of one checkpoint apart: only light of the same part is gone on
 ///                    from

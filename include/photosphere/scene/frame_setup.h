@@ -59,8 +59,8 @@ struct FrameSetup {
   std::vector<EffectState> effectStates;
   RandomKey key;
   estimators::LightFieldLayout layout;  ///< of type `photosphere`; radius chosen where it was 0
-  /// Of the light field's lattice, made once for all batches; see estimators::eyeWeights.
-  std::shared_ptr<const std::vector<float>> eyeWeights;
+  /// Of the light field's lattice, made once for all batches; see estimators::visibleWeights.
+  std::shared_ptr<const std::vector<float>> visibleWeights;
   std::shared_ptr<const transport::PhotonGuide> guide;   ///< null = photons are not steered
   std::optional<estimators::PhotonMapLayout> photonMap;  ///< of type `photon_map`; radius chosen
   std::uint64_t photonMapPhotons = 0;                    ///< that one pass is expected to store
