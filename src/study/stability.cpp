@@ -136,6 +136,7 @@ class Table {
 
   StabilityRow rowOf(const StabilityCase& c, const std::string& estimator) const {
     StabilityRow row;
+    row.kind = c.kind;
     row.name = c.name;
     row.estimator = estimator;
     row.hard = c.hard;

@@ -200,6 +200,8 @@ void readEstimators(const fs::path& path, StabilityCatalogue& catalogue) {
 
 void readCases(const fs::path& path, StabilityCatalogue& catalogue) {
   const toml::table root = parse(path);
+  const std::string stem = path.stem().string();
+  const std::string kind = stem.substr(stem.find('_') + 1);
   for (const auto& [key, node] : root) {
     const toml::array* tables = node.as_array();
     if (key.str() != "case" || !tables || !tables->is_array_of_tables())
@@ -207,7 +209,7 @@ void readCases(const fs::path& path, StabilityCatalogue& catalogue) {
                                     node.source().begin.line));
     for (const toml::node& item : *tables)
       for (const std::string& each : itemsOf(*item.as_table()))
-        catalogue.cases.push_back(readCase(*item.as_table(), path.string(), each));
+        catalogue.cases.emplace_back(readCase(*item.as_table(), path.string(), each)).kind = kind;
   }
 }
 

@@ -35,6 +35,7 @@ struct StabilityOracle {
 
 struct StabilityCase {
   std::string name, hard;
+  std::string kind;   ///< name of its file without the number in front
   std::string trace;  ///< empty = a frame is rendered; else what is done instead
   SmokeSpec slab;     ///< of `trace`: tau, albedo, g, photons
   SmokeSpec smoke;

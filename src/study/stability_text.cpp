@@ -41,16 +41,43 @@ std::string stabilityLine(const StabilityRow& row) {
   return line;
 }
 
+std::vector<std::string> stabilityDigest(const std::vector<StabilityRow>& rows) {
+  struct Kind {
+    std::size_t rows = 0, failed = 0;
+    const StabilityRow* closest = nullptr;
+  };
+  std::vector<std::pair<std::string, Kind>> kinds;  // in the order of the rows
+  for (const StabilityRow& row : rows) {
+    if (kinds.empty() || kinds.back().first != row.kind) kinds.emplace_back(row.kind, Kind());
+    Kind& kind = kinds.back().second;
+    ++kind.rows;
+    if (!row.passed) ++kind.failed;
+    // A bound of 0 is kept exactly or not at all.
+    if (!row.passed || !(row.bound > 0)) continue;
+    if (!kind.closest || row.error * kind.closest->bound > kind.closest->error * row.bound)
+      kind.closest = &row;
+  }
+  std::vector<std::string> lines;
+  for (const auto& [name, kind] : kinds) {
+    lines.push_back(fmt::format("{:<10} {:>4} rows, {} outside", name, kind.rows, kind.failed));
+    if (kind.closest)
+      lines.back() +=
+          fmt::format("; closest to its bound: {} by {}, {:.2g} of {:g}", kind.closest->name,
+                      kind.closest->estimator, kind.closest->error, kind.closest->bound);
+  }
+  return lines;
+}
+
 void writeStabilityCsv(const std::filesystem::path& path, const std::vector<StabilityRow>& rows) {
   std::string text =
-      "case,estimator,hard,oracle,expected,result,error,bound,nan_samples,negative_samples,"
+      "kind,case,estimator,hard,oracle,expected,result,error,bound,nan_samples,negative_samples,"
       "capped_power,seconds,passed,message\n";
   for (const StabilityRow& r : rows)
-    text +=
-        fmt::format("{},{},{},{},{},{},{:.6g},{:.6g},{},{},{:.6g},{:.3f},{},{}\n", quoted(r.name),
-                    quoted(r.estimator), quoted(r.hard), quoted(r.oracle), quoted(r.expected),
-                    quoted(r.result), r.error, r.bound, r.nanSamples, r.negativeSamples,
-                    r.cappedPower, r.seconds, r.passed ? "yes" : "no", quoted(r.message));
+    text += fmt::format("{},{},{},{},{},{},{},{:.6g},{:.6g},{},{},{:.6g},{:.3f},{},{}\n",
+                        quoted(r.kind), quoted(r.name), quoted(r.estimator), quoted(r.hard),
+                        quoted(r.oracle), quoted(r.expected), quoted(r.result), r.error, r.bound,
+                        r.nanSamples, r.negativeSamples, r.cappedPower, r.seconds,
+                        r.passed ? "yes" : "no", quoted(r.message));
   writeFile(path, text);
 }
 

@@ -2,14 +2,17 @@
 
 #include <fmt/format.h>
 
+#include <bit>
+
 #include "photosphere/core/error.h"
 
 namespace photosphere::transport {
 
 namespace {
 
-// Bits of one brick's voxels.
+// Bits of one brick's voxels: a word for each z, in which x and y take three bits each.
 using Mask = std::array<std::uint64_t, 8>;
+constexpr std::uint64_t kFirstX = 0x0101010101010101u, kLastX = kFirstX << 7;
 
 // Marks voxels in bricks that come into being when first touched.
 class Marks {
@@ -21,40 +24,98 @@ class Marks {
                 -1) {}
 
   void mark(const Vec3i& v) {
-    const Vec3i b(v.x >> 3, v.y >> 3, v.z >> 3);
+    brick(Vec3i(v.x >> 3, v.y >> 3, v.z >> 3))[static_cast<std::size_t>(v.z & 7)] |=
+        std::uint64_t{1} << ((v.y & 7) * 8 + (v.x & 7));
+  }
+  // Marks what lies beside a mark, in x, y and z: a cube of three voxels about each. What would lie
+  // outside the table is left out.
+  Marks dilated() const { return alongZ(alongY(alongX(*this))); }
+
+  template <class Visit>
+  void forEach(const Visit& visit) const {
+    forEachBrick([&](const Vec3i& b, const Mask& mask) {
+      for (int z = 0; z < 8; ++z)
+        for (std::uint64_t bits = mask[static_cast<std::size_t>(z)]; bits != 0; bits &= bits - 1) {
+          const int i = std::countr_zero(bits);
+          visit(Vec3i(b.x * 8 + (i & 7), b.y * 8 + (i >> 3), b.z * 8 + z));
+        }
+    });
+  }
+
+ private:
+  template <class Visit>
+  void forEachBrick(const Visit& visit) const {
+    for (int z = 0; z < m_bricks.z; ++z)
+      for (int y = 0; y < m_bricks.y; ++y)
+        for (int x = 0; x < m_bricks.x; ++x) {
+          const std::int32_t brick = m_table[tableIndex({x, y, z})];
+          if (brick >= 0) visit(Vec3i(x, y, z), m_masks[static_cast<std::size_t>(brick)]);
+        }
+  }
+  Mask& brick(const Vec3i& b) {
     std::int32_t& brick = m_table[tableIndex(b)];
     if (brick < 0) {
       brick = static_cast<std::int32_t>(m_masks.size());
       m_masks.emplace_back();
     }
-    m_masks[static_cast<std::size_t>(brick)][static_cast<std::size_t>(v.z & 7)] |=
-        std::uint64_t{1} << ((v.y & 7) * 8 + (v.x & 7));
+    return m_masks[static_cast<std::size_t>(brick)];
   }
-  bool marked(const Vec3i& v) const {
-    if (v.x < 0 || v.y < 0 || v.z < 0) return false;
-    const Vec3i b(v.x >> 3, v.y >> 3, v.z >> 3);
-    if (b.x >= m_bricks.x || b.y >= m_bricks.y || b.z >= m_bricks.z) return false;
-    const std::int32_t brick = m_table[tableIndex(b)];
-    return brick >= 0 &&
-           (m_masks[static_cast<std::size_t>(brick)][static_cast<std::size_t>(v.z & 7)] >>
-            ((v.y & 7) * 8 + (v.x & 7))) &
-               1;
+  // The bits that leave a brick on either side are handed to its neighbours along that axis.
+  template <class Inside, class Up, class Down>
+  static Marks along(int axis, const Marks& marks, const Inside& inside, const Up& up,
+                     const Down& down) {
+    Marks out(marks.m_bricks);
+    const auto add = [&](const Vec3i& b, const Mask& mask) {
+      if (b[axis] < 0 || b[axis] >= marks.m_bricks[axis] || mask == Mask{}) return;
+      Mask& into = out.brick(b);
+      for (std::size_t z = 0; z < 8; ++z)
+        into[z] |= mask[z];
+    };
+    marks.forEachBrick([&](const Vec3i& b, const Mask& mask) {
+      Vec3i step(0);
+      step[axis] = 1;
+      add(b, inside(mask));
+      add(b + step, up(mask));
+      add(b - step, down(mask));
+    });
+    return out;
   }
-  template <class Visit>
-  void forEach(const Visit& visit) const {
-    for (int z = 0; z < m_bricks.z; ++z)
-      for (int y = 0; y < m_bricks.y; ++y)
-        for (int x = 0; x < m_bricks.x; ++x) {
-          const std::int32_t brick = m_table[tableIndex({x, y, z})];
-          if (brick < 0) continue;
-          const Mask& mask = m_masks[static_cast<std::size_t>(brick)];
-          for (int i = 0; i < 512; ++i)
-            if (mask[static_cast<std::size_t>(i >> 6)] >> (i & 63) & 1)
-              visit(Vec3i(x * 8 + (i & 7), y * 8 + (i >> 3 & 7), z * 8 + (i >> 6)));
-        }
+  template <class Word>
+  static auto wordwise(const Word& word) {
+    return [word](const Mask& mask) {
+      Mask out;
+      for (std::size_t z = 0; z < 8; ++z)
+        out[z] = word(mask[z]);
+      return out;
+    };
+  }
+  static Marks alongX(const Marks& marks) {
+    return along(0, marks, wordwise([](std::uint64_t w) {
+                   return w | (w & ~kLastX) << 1 | (w & ~kFirstX) >> 1;
+                 }),
+                 wordwise([](std::uint64_t w) { return (w & kLastX) >> 7; }),
+                 wordwise([](std::uint64_t w) { return (w & kFirstX) << 7; }));
+  }
+  static Marks alongY(const Marks& marks) {
+    return along(1, marks, wordwise([](std::uint64_t w) { return w | w << 8 | w >> 8; }),
+                 wordwise([](std::uint64_t w) { return w >> 56; }),
+                 wordwise([](std::uint64_t w) { return w << 56; }));
+  }
+  static Marks alongZ(const Marks& marks) {
+    return along(
+        2, marks,
+        [](const Mask& mask) {
+          Mask out = mask;
+          for (std::size_t z = 0; z < 7; ++z) {
+            out[z] |= mask[z + 1];
+            out[z + 1] |= mask[z];
+          }
+          return out;
+        },
+        [](const Mask& mask) { return Mask{mask[7]}; },
+        [](const Mask& mask) { return Mask{0, 0, 0, 0, 0, 0, 0, mask[0]}; });
   }
 
- private:
   std::size_t tableIndex(const Vec3i& b) const {
     return (static_cast<std::size_t>(b.z) * static_cast<std::size_t>(m_bricks.y) +
             static_cast<std::size_t>(b.y)) *
@@ -128,25 +189,14 @@ SupportLattice::SupportLattice(const Medium& medium, double edge, int margin,
   const Vec3d bricks = glm::ceil(voxels / 8.0);
   checkTable(bricks);
   m_bricks = Vec3i(bricks);
-  Marks base(m_bricks);
+  Marks marks(m_bricks);
   if (medium.isMoving())
-    markWays(medium, m_origin, edge, base);
+    markWays(medium, m_origin, edge, marks);
   else
-    markSupport(medium, m_origin, edge, base);
-  Marks dilated(m_bricks);
-  base.forEach([&](const Vec3i& v) {
-    bool inside = true;  // all neighbours marked: they dilate for this voxel
-    for (int z = -1; z <= 1 && inside; ++z)
-      for (int y = -1; y <= 1 && inside; ++y)
-        for (int x = -1; x <= 1 && inside; ++x)
-          inside = base.marked(v + Vec3i(x, y, z));
-    const int reach = inside ? 0 : margin;
-    for (int z = -reach; z <= reach; ++z)
-      for (int y = -reach; y <= reach; ++y)
-        for (int x = -reach; x <= reach; ++x)
-          dilated.mark(v + Vec3i(x, y, z));
-  });
-  dilated.forEach([&](const Vec3i& v) {
+    markSupport(medium, m_origin, edge, marks);
+  for (int i = 0; i < margin; ++i)
+    marks = marks.dilated();
+  marks.forEach([&](const Vec3i& v) {
     if (!keep || keep(m_origin + (Vec3d(v) + 0.5) * m_edge)) m_voxels.push_back(v);
   });
   number();

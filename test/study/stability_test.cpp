@@ -132,6 +132,26 @@ TEST(Stability, RowsPassWhenTheAnswerIsThat) {
   EXPECT_FALSE(rows[2].passed);
 }
 
+TEST(Stability, TheDigestNamesTheRowThatIsClosestToItsBound) {
+  const auto row = [](const char* kind, const char* name, double error, double bound) {
+    StabilityRow r;
+    r.kind = kind;
+    r.name = name;
+    r.estimator = "view";
+    r.error = error;
+    r.bound = bound;
+    r.passed = error <= bound;
+    return r;
+  };
+  const std::vector<std::string> lines =
+      stabilityDigest({row("media", "a", 0.1, 0.2), row("media", "b", 0.15, 0.25),
+                       row("media", "c", 0.3, 0.2), row("frames", "d", 0, 0)});
+  ASSERT_EQ(lines.size(), 2u);
+  EXPECT_EQ(lines[0],
+            "media         3 rows, 1 outside; closest to its bound: b by view, 0.15 of 0.25");
+  EXPECT_EQ(lines[1], "frames        1 rows, 0 outside");
+}
+
 TEST(Stability, RowsAreChosenByTheirNames) {
   const std::string slab =
       "[[case]]\nname = \"a\"\nhard = \"-\"\ntrace = \"slab_radiance\"\nslab = { g = 0 }\n"

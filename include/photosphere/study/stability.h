@@ -20,6 +20,7 @@ struct StabilityOptions {
 
 /// One case by one estimator.
 struct StabilityRow {
+  std::string kind;       ///< of the case: the catalogue's file
   std::string name;       ///< of the case
   std::string estimator;  ///< `-` where none takes part
   std::string hard;       ///< what is hard about it
@@ -45,6 +46,10 @@ std::vector<StabilityRow> runStability(const StabilityOptions& options,
 /// The head of the table and a row of it, as text of fixed columns without a final newline.
 std::string stabilityHead();
 std::string stabilityLine(const StabilityRow& row);
+
+/// For each kind how many rows there are, how many fail, and which of the others comes closest to
+/// its bound; lines without a final newline.
+std::vector<std::string> stabilityDigest(const std::vector<StabilityRow>& rows);
 
 /// All rows as CSV with a head. @throws OutputError
 void writeStabilityCsv(const std::filesystem::path& path, const std::vector<StabilityRow>& rows);

@@ -106,6 +106,8 @@ int reportHardCases(const Options& options) {
   const auto failed = std::count_if(rows.begin(), rows.end(),
                                     [](const study::StabilityRow& row) { return !row.passed; });
   if (!options.output.empty()) study::writeStabilityCsv(options.output, rows);
+  for (const std::string& line : study::stabilityDigest(rows))
+    printLine("{}", line);
   printLine("{} rows, {} outside their bounds", rows.size(), failed);
   return static_cast<int>(failed > 0 ? ExitCode::accuracy : ExitCode::ok);
 }
