@@ -60,7 +60,7 @@ class Tracing {
   }
 
   TraceStatistics run(const Medium& medium, const transport::LightList& lights, const View& view,
-                      transport::TraceOptions options) {
+                      const transport::TraceOptions& options) {
     const CarrierSums carriers(medium, lights, m_light.layout, view, options.key, m_sums);
     if (!m_light.layout.holdsPower()) {
       std::optional<VisibleWeight> weight;

@@ -220,7 +220,8 @@ double SmokeSpec::number(const std::string& name, double fallback) const {
   return found == numbers.end() ? fallback : found->second.front();
 }
 
-std::vector<double> SmokeSpec::list(const std::string& name, std::vector<double> fallback) const {
+std::vector<double> SmokeSpec::list(const std::string& name,
+                                    const std::vector<double>& fallback) const {
   const auto found = numbers.find(name);
   return found == numbers.end() ? fallback : found->second;
 }

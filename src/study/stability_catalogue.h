@@ -14,7 +14,7 @@ struct SmokeSpec {
   std::map<std::string, std::string> texts;
 
   double number(const std::string& name, double fallback) const;
-  std::vector<double> list(const std::string& name, std::vector<double> fallback = {}) const;
+  std::vector<double> list(const std::string& name, const std::vector<double>& fallback = {}) const;
   std::string text(const std::string& name, const std::string& fallback = {}) const;
   /// Names the smoke: equal specs, equal keys.
   std::string key() const;

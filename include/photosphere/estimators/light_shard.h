@@ -32,9 +32,10 @@ struct LightShard {
 };
 
 /// Writes one point grid named `light_shard`, a point per light voxel or particle, with
-/// `photon_sums` (64-bit integers, in the order of the light cache's values), and as metadata the
-/// quantum, counts and all that must agree between shards; a second grid, `light_particles`, where
-/// light is gathered on voxels for particles. Whole or not at all. @throws OutputError
+/// `photon_sums` (64-bit integers, in the order of the light cache's values, times `photon_weight`
+/// where that is there), and as metadata the quantum, counts and all that must agree between
+/// shards; a second grid, `light_particles`, where light is gathered on voxels for particles. Whole
+/// or not at all. @throws OutputError
 void writeLightShard(const std::filesystem::path& path, const LightShard& shard);
 
 /// @throws InputMissingError; InputError when the file is not a shard
