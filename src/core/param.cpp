@@ -161,7 +161,7 @@ std::string formatValue(const ParamValue& value) {
       std::string text = "\"";
       for (const char c : s) {
         if (c == '"' || c == '\\') text += '\\';
-        if (static_cast<unsigned char>(c) < 0x20)
+        if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f)
           text += fmt::format("\\u{:04x}", static_cast<int>(c));
         else
           text += c;

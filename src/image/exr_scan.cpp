@@ -167,8 +167,19 @@ void checkHeader(const ExrBytes& bytes, RawHeader& header, bool multiPart) {
     bytes.damaged("its chunk count does not match its windows");
 }
 
-/// OpenEXR reads as many bytes as a type takes, whatever size is stated, and what is left would be
-/// its next attribute: it would then see another header than this scan.
+/// Where strings end, each behind its length, that begin here and should end at `end`.
+std::uint64_t endOfStrings(ExrBytes& bytes, std::uint64_t end) {
+  std::uint64_t at = bytes.position();
+  while (at < end) {
+    bytes.seek(at);
+    at += 4 + std::uint64_t{bytes.value<std::uint32_t>()};
+  }
+  return at;
+}
+
+/// OpenEXR reads as many bytes as a type takes, or on to where its content ends, whatever size is
+/// stated, and what is left would be its next attribute: it would then see another header than this
+/// scan.
 void checkSize(ExrBytes& bytes, const std::string& name, std::string_view type, std::int32_t size) {
   static constexpr std::pair<std::string_view, std::int32_t> sizes[] = {
       {"box2f", 16},
@@ -199,13 +210,20 @@ void checkSize(ExrBytes& bytes, const std::string& name, std::string_view type, 
   std::int64_t expected = size;
   for (const auto& [known, itsSize] : sizes)
     if (type == known) expected = itsSize;
+  const std::uint64_t begin = bytes.position();
   if (type == "preview") {
-    const std::uint64_t begin = bytes.position();
     const auto width = bytes.value<std::uint32_t>(), height = bytes.value<std::uint32_t>();
-    bytes.seek(begin);
     if (width > 1u << 14 || height > 1u << 14) bytes.damaged("its preview has an impossible size");
     expected = 8 + 4 * std::int64_t{width} * std::int64_t{height};
+  } else if (type == "chlist") {
+    RawHeader unused;
+    readChannels(bytes, unused);
+    expected = static_cast<std::int64_t>(bytes.position() - begin);
+  } else if (type == "stringvector") {
+    const std::uint64_t end = begin + static_cast<std::uint64_t>(size);
+    expected = static_cast<std::int64_t>(endOfStrings(bytes, end) - begin);
   }
+  bytes.seek(begin);
   if (size != expected)
     bytes.damaged(fmt::format("attribute '{}' of type {} has {} bytes", name, type, size));
 }

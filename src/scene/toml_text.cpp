@@ -35,41 +35,6 @@ std::optional<std::size_t> indexOf(const std::string& segment) {
   throw ConfigError(fmt::format("{}:{}:{}: not valid TOML: {}", name, line, column, why));
 }
 
-// The parser calls `é` outside of quotes impossible, where it should say so (toml++ 3.3,
-// is_non_ascii_horizontal_whitespace). TOML has such characters in strings and comments alone.
-void refuseBareUnicode(std::string_view text, const std::string& name) {
-  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);  // a mark that some editors set
-  std::size_t line = 1, lineBegin = 0;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    const char c = text[i];
-    if (c == '\n') {
-      ++line;
-      lineBegin = i + 1;
-    } else if (c == '#') {
-      i = std::min(text.find('\n', i), text.size()) - 1;
-    } else if (c == '"' || c == '\'') {
-      const std::string_view mark(text.data() + i, 1);
-      const bool tripled = text.substr(i, 3) == std::string(3, c);
-      const std::string end = tripled ? std::string(3, c) : std::string(mark);
-      for (i += end.size(); i < text.size() && text.substr(i, end.size()) != end; ++i) {
-        if (c == '"' && text[i] == '\\') ++i;
-        if (i < text.size() && text[i] == '\n') {
-          if (!tripled) break;  // the parser will say that the string has no end
-          ++line;
-          lineBegin = i + 1;
-        }
-      }
-      if (i < text.size() && text[i] == '\n')
-        --i;
-      else
-        i += end.size() - 1;
-    } else if (static_cast<unsigned char>(c) >= 0x80) {
-      notToml(name, line, i - lineBegin + 1,
-              "a character that is not ASCII stands outside of quotes; put quotes around it");
-    }
-  }
-}
-
 bool stumbles(std::string_view text) {
   try {
     static_cast<void>(toml::parse(text));
@@ -95,11 +60,12 @@ std::size_t lineOfAssertion(std::string_view text) {
 
 // @throws ConfigError
 toml::table parseChecked(const std::string& text, const std::string& name) {
-  refuseBareUnicode(text, name);
   try {
     return toml::parse(text, name);
   } catch (const toml::parse_error& error) {
-    notToml(name, error.source().begin.line, error.source().begin.column, error.description());
+    std::string why(error.description());
+    if (why.ends_with("could not determine value type")) why += "; put quotes around text";
+    notToml(name, error.source().begin.line, error.source().begin.column, why);
   } catch (const TomlAssertion&) {
     notToml(name, lineOfAssertion(text), 1, "the parser cannot make sense of this line");
   }

@@ -323,6 +323,32 @@ TEST(Exr, hugeClaimsAreRefusedBeforeMemoryIsTaken) {
   EXPECT_THROW(readExr(folder / "bad.exr"), InputError);
 }
 
+// OpenEXR reads on to where such an attribute ends by itself, into memory that nobody stated.
+TEST(Exr, attributesThatEndElsewhereThanTheySayAreRefused) {
+  const TemporaryFolder folder;
+  writeExr(folder / "whole.exr", makeImage(9, 40));
+  const std::string whole = test::readText(folder / "whole.exr");
+  const std::string channel = std::string("R") + '\0' + std::string(16, '\0') + '\0';
+  const std::string text = std::string("\2\0\0\0", 4) + "ab";
+  for (const auto& [type, content] :
+       {std::pair<std::string, std::string>{"chlist", channel}, {"stringvector", text + text}})
+    for (const int more : {-1, 0, 1}) {
+      std::string size(4, '\0');
+      size[0] = static_cast<char>(static_cast<int>(content.size()) + more);
+      const std::string attribute = std::string("x") + '\0' + type + '\0' + size + content;
+      test::writeText(folder / "x.exr", whole.substr(0, 8) + attribute +
+                                            std::string(more > 0, 'z') + whole.substr(8));
+      std::string message;
+      try {
+        readExr(folder / "x.exr");
+      } catch (const InputError& error) {
+        message = error.what();  // for the right size, that chunks are not where they were
+      }
+      EXPECT_EQ(message.find("attribute 'x' of type " + type) != std::string::npos, more != 0)
+          << type << ' ' << more << ' ' << message;
+    }
+}
+
 TEST(Exr, missingFileAndOtherFormats) {
   const TemporaryFolder folder;
   EXPECT_THROW(readExr(folder / "none.exr"), InputMissingError);

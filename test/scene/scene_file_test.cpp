@@ -256,6 +256,35 @@ TEST(SceneFileTest, DumpReadsBackToTheSameScene) {
   EXPECT_TRUE(again.camera.given("focal_length"));
 }
 
+TEST(SceneFileTest, DumpKeepsEveryCharacter) {
+  std::string name = "\xC3\xA9";
+  for (char c = 1; c > 0; ++c)
+    name += c;
+  const SceneFile s = parse(kSmoke, {"volume.0.density=" + name});
+  EXPECT_EQ(s.volumes.at(0).values.text("density"), name);
+  const SceneFile again = parseScene(dumpScene(s), "dump.toml", "/shots");
+  EXPECT_EQ(again.volumes.at(0).values.text("density"), name);
+}
+
+// The parser asks whether a letter is a space in valid text, too.
+TEST(SceneFileTest, LettersBeyondAsciiStandInQuotes) {
+  const SceneFile s = parse(kSmoke + "[output]\nfile = \"\"\"\\\n   \u00e9t\u00e9.exr\"\"\"\n");
+  EXPECT_EQ(s.output.text("file"), "\u00e9t\u00e9.exr");
+  struct Bare {
+    const char* text;
+    const char* place;
+  };
+  for (const Bare& bare : {Bare{"\u00e9 = 1", ":3:1"},
+                           {"[camera]\nfov = \u00e9", ":4:7"},
+                           {"[camera]\nfov = 1 \u00e9", ":4:9"},
+                           {"[cam\u00e9ra]", ":3:5"},
+                           {"1=+\"s\u015a", ":3:3"},
+                           {"x = 2020-01-01 \u00e9", ":3:16"}}) {
+    const std::string message = complaint([&] { parse(kSmoke + bare.text); });
+    EXPECT_TRUE(contains(message, "shot.toml" + std::string(bare.place))) << message;
+  }
+}
+
 TEST(SceneFileTest, TheHashFollowsPixelsAndNotPlaces) {
   const std::string hash = parse(kBase).hash();
   EXPECT_EQ(parse(kBase, {"volume.0.file=b.vdb", "output.file=x.exr", "scene.frames=4"}).hash(),
