@@ -38,15 +38,14 @@ void checkLayout(const LightFieldLayout& l) {
          "carriers hold no energy to share out");
   refuse(l.merge == Merge::sampled && !particles,
          "merge = \"sampled\" draws one bin of each particle: it needs carrier = \"particles\"");
-  refuse(l.smoothing == Smoothing::visible && l.holdsPower(),
-         "smoothing = \"visible\" weighs fluence on voxels: it needs carrier = \"voxels\" or "
-         "deposit = "
-         "\"track_length\"");
+  refuse(
+      l.smoothing == Smoothing::visible && l.holdsPower(),
+      "smoothing = \"visible\" weighs fluence on voxels: it needs carrier = \"voxels\" or deposit "
+      "= \"track_length\"");
   refuse(l.smoothing != Smoothing::twicing && l.smoothing != Smoothing::visible &&
              (particles || l.evaluate == Evaluate::perStep),
          "smoothing = \"plain\", \"density\" and \"mean\" are of fluence on voxels, once for each "
-         "view: "
-         "they need carrier = \"voxels\" and evaluate = \"per_view\"");
+         "view: they need carrier = \"voxels\" and evaluate = \"per_view\"");
   if (l.basis == Basis::view) {
     refuse(l.evaluate != Evaluate::perView,
            "evaluate = \"per_step\" reads directions at every step, and basis = \"view\" keeps "

@@ -52,9 +52,9 @@ struct ReadLight {
   }
 };
 
-// Folds directions and phase into one colour per carrier.
+// Folds directions and phase into one colour per carrier, times its weight (nullptr = 1).
 Colours foldPhase(const LightField& field, const View& view, std::size_t set,
-                  const PhaseReader& reader, RandomKey key) {
+                  const PhaseReader& reader, const std::vector<float>* weights, RandomKey key) {
   const LightFieldLayout& layout = field.layout;
   const auto stride = static_cast<std::size_t>(layout.valuesPerCarrier());
   const std::size_t offset = set * static_cast<std::size_t>(layout.setSize());
@@ -76,7 +76,7 @@ Colours foldPhase(const LightField& field, const View& view, std::size_t set,
       // give that light back elsewhere. Cutting it off here would make light of noise: neighbours
       // together hold enough to be positive. The fourth value notes how much there is.
       const Rgb below = sampled ? Rgb(0.0f) : glm::max(-colour, Rgb(0.0f));
-      colours[i] = Vec4f(colour, meanComponent(below));
+      colours[i] = Vec4f(colour, meanComponent(below)) * (weights ? (*weights)[i] : 1.0f);
     }
   });
   return colours;
@@ -102,15 +102,13 @@ class ResolvedField final : public InscatterSource {
     const std::size_t sets = m_unscattered ? 2 : 1;
     const auto phases = static_cast<std::size_t>(m_phases);
     m_fields.resize(sets * phases);
-    std::shared_ptr<const std::vector<float>> weights = field.weights;
-    if (m_weighted && !weights) weights = visibleWeights(medium, lattice, field.layout, view);
+    std::shared_ptr<const std::vector<float>> weights;
+    if (m_weighted)
+      weights = field.weights ? field.weights : visibleWeights(medium, lattice, field.layout, view);
     for (std::size_t k = 0; k < phases; ++k) {
       const PhaseReader reader(field.layout, medium, static_cast<int>(k));
       for (std::size_t set = 0; set < sets; ++set) {
-        Colours folded = foldPhase(field, view, set, reader, key);
-        if (m_weighted)
-          for (std::size_t i = 0; i < folded.size(); ++i)
-            folded[i] *= (*weights)[i];
+        Colours folded = foldPhase(field, view, set, reader, weights.get(), key);
         m_read.count(folded);
         if (m_weighted)
           folded = smoothWeighted(lattice, folded, *weights, field.layout);

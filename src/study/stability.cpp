@@ -146,6 +146,11 @@ class Table {
   }
 
   void finish(StabilityRow row) {
+    // The folder is gone with the run.
+    const std::string folder = m_folder.path().string() + '/';
+    for (std::size_t at = row.message.find(folder); at != std::string::npos;
+         at = row.message.find(folder, at))
+      row.message.erase(at, folder.size());
     if (m_each) m_each(row);
     m_rows.push_back(std::move(row));
   }

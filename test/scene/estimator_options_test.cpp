@@ -119,6 +119,11 @@ class DirectionsOfAScene : public ::testing::Test {
     }
     return parseScene(ballScene(path, Vec3d(0), 1), "test.toml", m_folder.path(), sets);
   }
+  // What made the pixels of a frame that reads the cache.
+  std::string layoutBy(const std::string& cache, Sets sets = {}) {
+    sets.push_back("estimator.cache=" + cache);
+    return renderScene(scene(sets), 1).layout;
+  }
   TemporaryFolder m_folder;
 };
 
@@ -154,32 +159,26 @@ TEST_F(DirectionsOfAScene, RenderByEveryKey) {
 TEST_F(DirectionsOfAScene, AreReadFromACacheAsTheSceneSays) {
   const std::string cache = (m_folder / "light.vdb").string();
   traceScene(scene({"estimator.direction=barycentric"}), 1, cache);
-  const FrameResult plain = renderScene(scene({"estimator.cache=" + cache}), 1);
-  EXPECT_TRUE(contains(plain.layout, "direction barycentric")) << plain.layout;
-  const FrameResult smooth =
-      renderScene(scene({"estimator.cache=" + cache, "estimator.kernel=gaussian",
-                         "estimator.evaluate=per_step"}),
-                  1);
-  EXPECT_TRUE(contains(smooth.layout, "direction barycentric, evaluate per_step, kernel gaussian"))
-      << smooth.layout;
-  const std::string message = complaint([&] {
-    renderScene(scene({"estimator.cache=" + cache, "estimator.merge=sampled"}), 1);
-  });
+  const std::string plain = layoutBy(cache);
+  EXPECT_TRUE(contains(plain, "direction barycentric")) << plain;
+  const std::string smooth =
+      layoutBy(cache, {"estimator.kernel=gaussian", "estimator.evaluate=per_step"});
+  EXPECT_TRUE(contains(smooth, "direction barycentric, evaluate per_step, kernel gaussian"))
+      << smooth;
+  const std::string message = complaint([&] { layoutBy(cache, {"estimator.merge=sampled"}); });
   EXPECT_TRUE(contains(message, "particles")) << message;
-  const FrameResult seen =
-      renderScene(scene({"estimator.cache=" + cache, "estimator.smoothing=visible"}), 1);
-  EXPECT_TRUE(contains(seen.layout, "smoothing visible")) << seen.layout;
+  const std::string seen = layoutBy(cache, {"estimator.smoothing=visible"});
+  EXPECT_TRUE(contains(seen, "smoothing visible")) << seen;
 }
 
 // What photons counted by is read as it was stored, unless the scene says otherwise.
 TEST_F(DirectionsOfAScene, KeepWhatTheyCountByInACache) {
   const std::string cache = (m_folder / "light.vdb").string();
   traceScene(scene({"estimator.smoothing=visible"}), 1, cache);
-  const FrameResult seen = renderScene(scene({"estimator.cache=" + cache}), 1);
-  EXPECT_TRUE(contains(seen.layout, "smoothing visible")) << seen.layout;
-  const FrameResult plain =
-      renderScene(scene({"estimator.cache=" + cache, "estimator.smoothing=plain"}), 1);
-  EXPECT_TRUE(contains(plain.layout, "smoothing plain")) << plain.layout;
+  const std::string seen = layoutBy(cache);
+  EXPECT_TRUE(contains(seen, "smoothing visible")) << seen;
+  const std::string plain = layoutBy(cache, {"estimator.smoothing=plain"});
+  EXPECT_TRUE(contains(plain, "smoothing plain")) << plain;
 }
 
 }  // namespace

@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <map>
+#include <set>
 
 #include "photosphere/core/sampling.h"
 #include "photosphere/transport/support_lattice.h"
@@ -36,6 +38,27 @@ TEST(SupportLattice, CoversAllSmokeWithItsMargin) {
   EXPECT_GT(smoky, 2000);
   for (std::size_t i = 0; i < lattice.size(); ++i)
     ASSERT_EQ(lattice.number(lattice.voxel(i)), static_cast<std::int32_t>(i));
+}
+
+TEST(SupportLattice, AMarginIsThatOfEveryVoxel) {
+  const transport::Medium medium =
+      makeMedium(sampledVolume(1.0, 32, {0.9, 0.0, 10.0}, plumeDensity));
+  const double edge = 1.0 / 64;  // origins differ by exact numbers
+  const SupportLattice base(medium, edge, 0);
+  ASSERT_GT(base.size(), 1000u);
+  for (const int margin : {1, 2, 3}) {
+    const SupportLattice lattice(medium, edge, margin);
+    std::set<std::array<int, 3>> expected, found;
+    for (std::size_t i = 0; i < base.size(); ++i)
+      for (int z = 0; z <= 2 * margin; ++z)
+        for (int y = 0; y <= 2 * margin; ++y)
+          for (int x = 0; x <= 2 * margin; ++x)
+            expected.insert({base.voxel(i).x + x, base.voxel(i).y + y, base.voxel(i).z + z});
+    for (std::size_t i = 0; i < lattice.size(); ++i)
+      found.insert({lattice.voxel(i).x, lattice.voxel(i).y, lattice.voxel(i).z});
+    EXPECT_EQ(found.size(), lattice.size());
+    EXPECT_EQ(found, expected) << margin;
+  }
 }
 
 TEST(SupportLattice, WalkGivesEachVoxelItsLength) {
