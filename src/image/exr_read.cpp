@@ -59,7 +59,7 @@ void checkReadable(const std::string& path, const ExrScan& scan) {
 
 /// Every bound was set by what the scan saw.
 void checkSameHeader(const std::string& path, const ExrPart& part, const Imf::Header& header) {
-  const Imath::Box2i box = header.dataWindow();
+  const Imath::Box2i& box = header.dataWindow();
   int channels = 0;
   bool same = box.min == Imath::V2i(part.data.x, part.data.y) &&
               box.size() == Imath::V2i(part.data.width - 1, part.data.height - 1) &&
@@ -74,7 +74,7 @@ void checkSameHeader(const std::string& path, const ExrPart& part, const Imf::He
 ExrFile readPixels(const std::string& path, const ExrPart& part) {
   Imf::InputFile file(path.c_str(), 0);
   const Imf::Header& header = file.header();
-  const Imath::Box2i box = header.dataWindow();
+  const Imath::Box2i& box = header.dataWindow();
   checkSameHeader(path, part, header);
   ExrFile result{Image(part.data, part.display), getAttributes(header)};
   for (auto at = header.channels().begin(); at != header.channels().end(); ++at) {

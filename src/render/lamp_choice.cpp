@@ -51,8 +51,10 @@ LampChoice::LampChoice(const transport::Medium& medium,
     std::vector<double> sums(m_lamps);
     for (std::size_t i = begin; i < end; ++i) {
       const auto n = static_cast<std::size_t>(cells);
-      const Vec3d place(static_cast<double>(i % n), static_cast<double>(i / n % n),
-                        static_cast<double>(i / (n * n)));
+      const std::size_t row = i / n;
+      const std::size_t slice = row / n;
+      const Vec3d place(static_cast<double>(i % n), static_cast<double>(row % n),
+                        static_cast<double>(slice));
       const lights::BoundingSphere around{box.min + (place + 0.5) * cell, radius};
       double sum = 0;
       for (std::size_t lamp = 0; lamp < m_lamps; ++lamp) {

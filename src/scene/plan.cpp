@@ -78,7 +78,8 @@ class RayCost {
     const bool paths = sendsPaths(scene);
     const auto samples = [&](const SceneFile& s) {
       const std::int64_t n = (paths ? s.estimator : s.render).integer("samples");
-      return static_cast<double>((n + setup.batches - 1) / setup.batches);
+      const std::int64_t inOne = (n + setup.batches - 1) / setup.batches;
+      return static_cast<double>(inOne);
     };
     m_rays = m_some->rays({{0, 0}, setup.camera->resolution()}) * samples(scene) / samples(fewer);
   }

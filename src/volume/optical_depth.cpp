@@ -57,8 +57,7 @@ class Columns {
 };
 
 double percentile(std::vector<double>& values, double fraction) {
-  const auto at = values.begin() + static_cast<std::ptrdiff_t>(
-                                       fraction * static_cast<double>(values.size() - 1) + 0.5);
+  const auto at = values.begin() + std::llround(fraction * static_cast<double>(values.size() - 1));
   std::nth_element(values.begin(), at, values.end());
   return *at;
 }

@@ -46,7 +46,8 @@ Attribute& ParticleSet::add(Attribute attribute) {
 Box3d ParticleSet::bounds() const {
   Box3d box;
   for (const Vec3d& p : positions)
-    if (p == p) box.grow(p);  // a NaN would spoil the box, or not, depending on the order
+    if (!glm::any(glm::isnan(p)))
+      box.grow(p);  // a NaN would spoil the box, or not, depending on the order
   return box;
 }
 
