@@ -5,9 +5,11 @@
 #include <cstring>
 
 #include "photosphere/caches/cache_format.h"
+#include "photosphere/core/checkpoint.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/log.h"
 #include "photosphere/estimators/light_cache.h"
+#include "photosphere/estimators/light_shard.h"
 #include "photosphere/image/exr.h"
 #include "photosphere/volume/vdb_file.h"
 #include "support/support.h"
@@ -135,27 +137,48 @@ void addHandMade(std::vector<Specimen>& all) {
   all.push_back({"detect", "ply", "ply\nformat ascii 1.0\n"});
 }
 
-std::string lightCache(estimators::Carrier carrier) {
-  estimators::LightField field;
-  field.layout.basis = estimators::Basis::histogram;
-  field.layout.carrier = carrier;
-  field.layout.deposit = carrier == estimators::Carrier::voxels ? estimators::Deposit::trackLength
+/// Of three voxels, with weights, or of three particles: what fields and sums of light share.
+template <class Light>
+Light lightOf(estimators::Carrier carrier) {
+  Light light;
+  light.layout.basis = estimators::Basis::histogram;
+  light.layout.carrier = carrier;
+  light.layout.deposit = carrier == estimators::Carrier::voxels ? estimators::Deposit::trackLength
                                                                 : estimators::Deposit::collision;
-  field.layout.rows = 1;
-  field.layout.channels = 1;
-  field.layout.radius = field.layout.depositRadius = 0.5;
+  light.layout.rows = 1;
+  light.layout.channels = 1;
+  light.layout.radius = light.layout.depositRadius = 0.5;
   const std::vector<Vec3i> voxels{{1, 2, 3}, {1, 2, 4}, {9, 2, 3}};
   if (carrier == estimators::Carrier::voxels) {
-    field.lattice = transport::SupportLattice(Vec3d(-1), 0.25, Vec3i(2, 1, 1), voxels);
-    field.layout.smoothing = estimators::Smoothing::visible;
-    field.weights = std::make_shared<const std::vector<float>>(3, 0.5f);
+    light.lattice = transport::SupportLattice(Vec3d(-1), 0.25, Vec3i(2, 1, 1), voxels);
+    light.layout.smoothing = estimators::Smoothing::visible;
+    light.weights = std::make_shared<const std::vector<float>>(3, 0.5f);
   } else {
-    field.particles = {Vec3f(0.1f), Vec3f(0.2f), Vec3f(0.7f)};
+    light.particles = {Vec3f(0.1f), Vec3f(0.2f), Vec3f(0.7f)};
   }
+  return light;
+}
+
+std::string lightCache(estimators::Carrier carrier) {
+  auto field = lightOf<estimators::LightField>(carrier);
   for (int i = 0; i < 3 * 8; ++i)
     field.values.push_back(static_cast<float>(i));
   const TemporaryFolder folder;
   estimators::writeLightCache(folder / "a.vdb", field, {"m", "l", {}});
+  return test::readText(folder / "a.vdb");
+}
+
+std::string lightShard(estimators::Carrier carrier) {
+  estimators::LightShard shard;
+  shard.light = lightOf<estimators::LightSums>(carrier);
+  shard.light.photons = shard.light.photonCount = 100;
+  for (int i = 0; i < 3 * 8; ++i)
+    shard.light.sums.push_back(1000 + i);
+  shard.key = {"m", "l", {}};
+  shard.randomKey.assign(1, 'r');
+  shard.build.assign(1, 'b');
+  const TemporaryFolder folder;
+  estimators::writeLightShard(folder / "a.vdb", shard);
   return test::readText(folder / "a.vdb");
 }
 
@@ -174,8 +197,11 @@ void addVolumes(std::vector<Specimen>& all) {
   std::string streamed = test::readText(folder / "b.vdb");
   streamed[20] = 0;  // says that the file lacks the offsets of its grids
   all.push_back({"vdb.walk", "without_offsets", streamed});
-  all.push_back({"light_cache", "voxels", lightCache(estimators::Carrier::voxels)});
-  all.push_back({"light_cache", "particles", lightCache(estimators::Carrier::particles)});
+  for (const auto& [name, carrier] : {std::pair("voxels", estimators::Carrier::voxels),
+                                      std::pair("particles", estimators::Carrier::particles)}) {
+    all.push_back({"light_cache", name, lightCache(carrier)});
+    all.push_back({"light_shard", name, lightShard(carrier)});
+  }
 }
 
 std::string exr(image::ExrCompression compression) {
@@ -216,6 +242,19 @@ void addPictures(std::vector<Specimen>& all) {
   all.push_back({"hdr", "runs", radiance()});
 }
 
+/// A part of a checkpoint, of the work named `work`.
+std::string checkpointPart() {
+  const TemporaryFolder folder;
+  Checkpoint checkpoint(folder / "a.exr.checkpoint", 1e9, Resume::automatic);
+  checkpoint.identify("work");
+  checkpoint.save("light", [](StateWriter& out) {
+    out.text("stage");
+    out.value(std::vector<double>{1, 2.5, -3});
+    out.value(std::vector<std::int64_t>{7, 8});
+  });
+  return test::readText(folder / "a.exr.checkpoint" / "light");
+}
+
 void addTexts(std::vector<Specimen>& all) {
   all.push_back({"scene", "keyed", R"([scene]
 fps = "24000/1001"
@@ -243,6 +282,7 @@ aovs = ["beauty", 'single']
   all.push_back({"chan", "shot",
                  "# frame, translation, rotation, field of view\n1 0 0 5 0 0 0 40\n"
                  "2\t+0.5 -1e-1 5 10 20 -30 41.5\r\n\n3 1 0 5 0 0 0 42\n"});
+  all.push_back({"checkpoint", "part", checkpointPart()});
 }
 
 }  // namespace

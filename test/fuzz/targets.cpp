@@ -5,14 +5,17 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <optional>
 #include <stdexcept>
 
 #include "exr_scan.h"
 #include "photosphere/caches/cache_format.h"
 #include "photosphere/cameras/chan.h"
+#include "photosphere/core/checkpoint.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/frames.h"
 #include "photosphere/estimators/light_cache.h"
+#include "photosphere/estimators/light_shard.h"
 #include "photosphere/image/exr.h"
 #include "photosphere/image/load.h"
 #include "photosphere/scene/scene_file.h"
@@ -183,6 +186,34 @@ void addVolumes(std::vector<Target>& all) {
                            "values without a carrier");
                  },
                  true});
+  all.push_back({"light_shard",
+                 [](const std::string& bytes, const fs::path& folder) {
+                   const fs::path path = place(folder, "shard.vdb", bytes);
+                   const auto shard = estimators::readLightShard(path);
+                   require(shard.light.sums.size() ==
+                               shard.light.places() *
+                                   static_cast<std::size_t>(shard.light.layout.valuesPerCarrier()),
+                           "sums without a place");
+                   estimators::mergeLightShards({path});
+                 },
+                 true});
+}
+
+/// Goes on from what a checkpoint's folder holds, as long work does.
+void readCheckpoint(const std::string& bytes, const fs::path& folder) {
+  const fs::path kept = folder / "a.exr.checkpoint";
+  fs::create_directories(kept);
+  place(kept, "light", bytes);
+  Checkpoint checkpoint(kept, 1e9, Resume::require);
+  checkpoint.identify("work");
+  std::optional<StateReader> in = checkpoint.load("light");
+  require(in.has_value(), "a part that was found unhurt cannot be loaded");
+  in->text();
+  std::vector<double> numbers;
+  in->value(numbers);
+  std::vector<std::int64_t> sums;
+  in->value(sums);
+  if (!in->atEnd()) in->fail();
 }
 
 void addPictures(std::vector<Target>& all) {
@@ -238,6 +269,7 @@ void addTexts(std::vector<Target>& all) {
       {"chan",
        [](const std::string& bytes, const fs::path&) { cameras::parseChan(bytes, "shot.chan"); },
        false});
+  all.push_back({"checkpoint", readCheckpoint, false});
 }
 
 }  // namespace
