@@ -106,7 +106,9 @@ std::string radiusRule(const volume::RasterizeResult& result, const ConvertOptio
 void addDensity(caches::CacheContent& content, const ConvertOptions& options) {
   ParticleSet& set = content.particles.front();
   volume::RasterizeResult result =
-      volume::rasterize(set, {.voxelSize = options.voxelSize, .radius = options.radius});
+      volume::rasterize(set, {.voxelSize = options.voxelSize,
+                              .radius = options.radius,
+                              .leaveOutStrays = true});
   const double difference =
       result.massParticles > 0 ? std::abs(result.massGrid / result.massParticles - 1) : 0;
   printLine("  radius     median {:.6g}: {}", result.radiusMedian, radiusRule(result, options));
@@ -122,6 +124,9 @@ void addDensity(caches::CacheContent& content, const ConvertOptions& options) {
         "{} particles have a position, radius or mass that is negative or not finite; "
         "they are kept as points and left out of the density",
         result.skipped);
+  if (result.strays)
+    log::warning("{}: they are kept as points and left out of the density",
+                 result.strays->text("particles"));
   if (!set.find("pscale"))
     // Renderers take the radius from here: without it the points would not say what they weigh.
     set.add({"pscale", 1, std::vector<float>(set.size(), static_cast<float>(result.radiusMedian))});

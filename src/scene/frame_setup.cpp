@@ -252,16 +252,26 @@ std::int64_t lightPaths(const SceneFile& scene, const FrameSetup& setup) {
   return scene.estimator.integer("samples") * size.x * size.y;
 }
 
-}  // namespace
+// Distance of the smoke from the middle of local space, in voxels, beyond which positions of
+// floats would be off by more than a thousandth of one.
+constexpr double kFarVoxels = 1e4;
 
-FrameSetup setUpFrame(const SceneFile& written, std::int64_t frame, const SetupOptions& options) {
-  const SceneFile scene = sceneOfFrame(written, frame, options);
+bool isOffCenter(const FrameSetup& setup) {
+  const Box3d& box = setup.medium->bounds();
+  return !box.empty() &&
+         glm::length(box.center()) >
+             std::max(kFarVoxels * setup.medium->voxelEdge(), glm::length(box.extent()));
+}
+
+// @param center  of local space, world space; nothing = the middle of all smoke
+FrameSetup setUpAbout(const std::optional<Vec3d>& center, const SceneFile& scene,
+                      std::int64_t frame, const SetupOptions& options) {
   FrameSetup setup;
   setup.frame = frame;
   setup.memoryBudget = memoryBudget(scene);
   const bool particles = scene.estimator.text("type") == "photosphere" &&
                          scene.estimator.text("carrier") == "particles";
-  buildMedium(scene, options.cacheFrame.value_or(frame), particles, setup);
+  buildMedium(scene, options.cacheFrame.value_or(frame), particles, center, setup);
   buildLights(scene, setup);
   buildCamera(scene, setup);
   planEffects(scene, options.forLightCache || !scene.estimator.text("cache").empty(), setup);
@@ -280,6 +290,19 @@ FrameSetup setUpFrame(const SceneFile& written, std::int64_t frame, const SetupO
   setup.photons = (photons + batches - 1) / batches;
   planPhotonMap(scene, setup);
   return setup;
+}
+
+}  // namespace
+
+FrameSetup setUpFrame(const SceneFile& written, std::int64_t frame, const SetupOptions& options) {
+  const SceneFile scene = sceneOfFrame(written, frame, options);
+  FrameSetup setup = setUpAbout({}, scene, frame, options);
+  if (!isOffCenter(setup)) return setup;
+  // The volumes that were left out as unseen lay far from the others.
+  FrameSetup nearer = setUpAbout(setup.worldBounds.center(), scene, frame, options);
+  nearer.readSeconds += setup.readSeconds;
+  nearer.rasterizeSeconds += setup.rasterizeSeconds;
+  return nearer;
 }
 
 bool storesLight(const SceneFile& scene, const FrameSetup& setup) {

@@ -98,11 +98,8 @@ transport::VolumeMotion placeMotion(const VolumeSource& source, const lights::Lo
   return motion;
 }
 
-// Optical depth of one voxel from where on more of it shows nowhere: the eye sees 1 % of such a
-// voxel's edge deep, and of light that scatters without loss 1 / 10,000 passes. Beyond, distances
-// between collisions would be lost in the rounding of positions, and extinction in the range of a
-// float.
-constexpr double kMostVoxelDepth = 1e4;
+// Beyond kMostVoxelDepth distances between collisions would be lost in the rounding of positions,
+// and extinction in the range of a float.
 // Density scales that stay within a float's range times any density.
 constexpr double kPlainScale = 1e20;
 
@@ -192,7 +189,7 @@ void dropCoincident(FrameSetup& setup) {
 }  // namespace
 
 void buildMedium(const SceneFile& scene, std::int64_t cacheFrame, bool wantParticles,
-                 FrameSetup& setup) {
+                 const std::optional<Vec3d>& center, FrameSetup& setup) {
   std::vector<VolumeSource> sources;
   const bool glows = scene.effects.text("emission") != "off";
   const bool moves = scene.effects.text("motion_blur") != "off";
@@ -205,7 +202,7 @@ void buildMedium(const SceneFile& scene, std::int64_t cacheFrame, bool wantParti
       setup.notes.push_back(note);
   }
   setup.space.metersPerUnit = scene.scene.real("meters_per_unit");
-  if (!setup.worldBounds.empty()) setup.space.center = setup.worldBounds.center();
+  if (!setup.worldBounds.empty()) setup.space.center = center.value_or(setup.worldBounds.center());
 
   const Stopwatch watch;
   const Vec2d frames = scene.camera.vec2("shutter") / scene.scene.real("fps");

@@ -89,6 +89,13 @@ std::span<const Param> volumeParams() {
        .defaultText = "0.0",
        .help = "of points that are rasterized; 0 = their pscale",
        .min = 0},
+      {.name = "strays",
+       .type = ParamType::text,
+       .unit = "",
+       .defaultText = "leave_out",
+       .help = "few particles or voxels far from all else, which would blow up the box that a "
+               "frame is laid out by",
+       .choices = "leave_out|keep"},
   };
   return rows;
 }

@@ -12,6 +12,7 @@
 #include "photosphere/volume/grid_variants.h"
 #include "photosphere/volume/invalid_values.h"
 #include "photosphere/volume/rasterize.h"
+#include "photosphere/volume/strays.h"
 #include "photosphere/volume/vdb_file.h"
 #include "photosphere/volume/velocity.h"
 
@@ -101,19 +102,50 @@ void heedSkipped(const SceneFile& scene, const volume::RasterizeResult& result, 
   source.notes.push_back(fmt::format("{}: {}; they are left out", source.path, what));
 }
 
+bool leavesOutStrays(const VolumeEntry& entry) {
+  return entry.values.text("strays") == "leave_out";
+}
+
+// From here on nothing of the volume lies outside of what is kept.
+void noteStrays(const volume::Strays& strays, std::string_view kind, VolumeSource& source) {
+  source.kept = strays.kept;
+  source.notes.push_back(fmt::format("{}: {}; left out (volume.strays = \"keep\" keeps them)",
+                                     source.path, strays.text(kind)));
+}
+
+void leaveOutStrays(VolumeSource& source) {
+  const Grid grids[] = {source.density, source.emission};
+  if (const auto strays = volume::findStrays(grids)) noteStrays(*strays, "voxels", source);
+  if (source.kept.empty()) return;
+  for (Grid* grid : {&source.density, &source.emission, &source.velocity, &source.albedo})
+    if (*grid) *grid = volume::clipped(*grid, source.kept);
+}
+
 Grid rasterized(const SceneFile& scene, const CacheGrids& cache, const VolumeEntry& entry,
                 bool wantVelocity, VolumeSource& source) {
   const Stopwatch watch;
   volume::RasterizeOptions options;
   options.radius = entry.values.real("particle_radius");
+  options.leaveOutStrays = leavesOutStrays(entry);
   const volume::ParticleSet points = pointsOf(cache);
   if (points.size() == 0) return {};
-  const volume::RasterizeResult result = volume::rasterize(points, options);
+  const volume::RasterizeResult result = [&] {
+    try {
+      return volume::rasterize(points, options);
+    } catch (const ConfigError& error) {
+      throw InputError(cache.path, error.what());
+    }
+  }();
   heedSkipped(scene, result, points.size(), source);
   source.notes.push_back(
       fmt::format("{}: {} points rasterized at voxel edge {:.4g}, radius {:.4g} to {:.4g}{}",
                   cache.path, points.size(), result.voxelSize, result.radiusMin, result.radiusMax,
                   result.radiusFromSpacing ? " (from their spacing; they have no pscale)" : ""));
+  options.leaveOutStrays = false;
+  if (result.strays) {
+    noteStrays(*result.strays, "particles", source);
+    options.within = result.strays->kept;
+  }
   if (const std::string& name = entry.values.text("velocity"); wantVelocity && !name.empty())
     source.velocity = volume::velocityOfParticles(points, name, options, cache.path);
   source.rasterizeSeconds = watch.seconds();
@@ -239,10 +271,12 @@ VolumeSource readVolume(const SceneFile& scene, const VolumeEntry& entry, std::i
     checkAffine(source.path, source.emission);
     heedInvalid(scene, "emission", temperature.empty(), source.emission, source);
   }
+  if (!cache.grids.empty() && leavesOutStrays(entry)) leaveOutStrays(source);
   if (wishes.particles)
     for (const Grid& grid : cache.pointGrids)
       for (const Vec3d& p : volume::gridToPoints(grid).positions)
-        source.particles.push_back(transformPoint(source.worldFromFile, p));
+        if (source.kept.empty() || source.kept.contains(p))
+          source.particles.push_back(transformPoint(source.worldFromFile, p));
   return source;
 }
 

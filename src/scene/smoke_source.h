@@ -39,6 +39,7 @@ struct VolumeSource {
   volume::Grid velocity;         ///< as the file has it; empty handle = none
   Mat4d worldFromFile{1.0};      ///< transform and origin of the scene file
   Vec3d indexShift{0.0};         ///< half a voxel where cell_centered
+  Box3d kept;                    ///< of the file's space; empty = nothing was left out as strays
   std::vector<Vec3d> particles;  ///< world space, where wanted
   double readSeconds = 0, rasterizeSeconds = 0;
   std::vector<std::string> notes;

@@ -223,6 +223,13 @@ RasterizeResult rasterize(const ParticleSet& particles, const RasterizeOptions& 
   initializeOpenVdb();
   RasterizeResult result;
   std::vector<Blob> blobs = collectBlobs(particles, options, result);
+  if (options.leaveOutStrays) result.strays = findStrays(blobs);
+  if (const Box3d& within = result.strays ? result.strays->kept : options.within; !within.empty())
+    std::erase_if(blobs, [&](const Blob& blob) {
+      const bool out = !within.contains(blob.position);
+      if (out) result.massParticles -= blob.mass;
+      return out;
+    });
   if (options.voxelSize == 0) checkRadii(result);
   result.voxelSize = chooseVoxelSize(blobs, options, result.radiusMedian);
   std::vector<Vec3d> positions;

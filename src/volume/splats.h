@@ -2,6 +2,7 @@
 // Particles prepared for rasterising: what is valid of them, in index space.
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "photosphere/volume/rasterize.h"
@@ -18,6 +19,9 @@ struct Blob {
 /// Valid particles in the set's order; fills the radius, mass and `skipped` fields of `result`.
 std::vector<Blob> collectBlobs(const ParticleSet& particles, const RasterizeOptions& options,
                                RasterizeResult& result);
+
+/// Strays of them, by their masses.
+std::optional<Strays> findStrays(const std::vector<Blob>& blobs);
 
 /// Mass of every particle, valid or not, by the rule of `rasterize`.
 std::vector<double> particleMasses(const ParticleSet& particles, const RasterizeOptions& options);

@@ -1,6 +1,7 @@
 // Densities, particles and settings at the edge of what numbers hold, as a frame is set up.
 
 #include "fixture.h"
+#include "photosphere/volume/rasterize.h"
 
 namespace photosphere::test {
 namespace {
@@ -107,6 +108,64 @@ TEST_F(HardValues, OneHugeParticleIsNamed) {
   EXPECT_NE(complaint([&] { setUp(file); }, ExitCode::memory).find("1e+07 times their median"),
             std::string::npos);
   EXPECT_EQ(complaint([&] { setUp(file, {"volume.0.particle_radius=0.2"}); }), "");
+}
+
+// Particles at rest in a ball, and one that a simulation lost.
+volume::ParticleSet withStray(double distance) {
+  volume::ParticleSet set;
+  for (int z = -8; z <= 8; ++z)
+    for (int y = -8; y <= 8; ++y)
+      for (int x = -8; x <= 8; ++x)
+        if (const Vec3d p = Vec3d(x, y, z) / 8.0; glm::length(p) < 1) set.positions.push_back(p);
+  set.positions.emplace_back(distance, -distance, distance);
+  set.add({"pscale", 1, std::vector<float>(set.size(), 0.2f)});
+  set.add({"v", 3, std::vector<float>(3 * set.size(), 1.0f)});
+  return set;
+}
+
+TEST_F(HardValues, StraysAreLeftOutUnlessTheSceneKeepsThem) {
+  const std::string points = write("a.vdb", {volume::pointsToGrid(withStray(1e7), "points", 1)});
+  const std::vector<std::string> moving{"volume.0.velocity=v", "effects.motion_blur=on"};
+  for (const auto& sets : {std::vector<std::string>{}, moving}) {
+    const FrameSetup setup = setUp(points, sets);
+    EXPECT_TRUE(notes(setup, "lies up to 1.732e+07 units away")) << sets.size();
+    EXPECT_LT(maxComponent(setup.medium->bounds().extent()), 3.0);
+    EXPECT_LT(glm::length(setup.space.center), 0.1);
+    EXPECT_EQ(setup.medium->isMoving(), !sets.empty());
+  }
+  const std::string nearer = write("b.vdb", {volume::pointsToGrid(withStray(50), "points", 1)});
+  EXPECT_LT(maxComponent(setUp(nearer).medium->bounds().extent()), 3.0);
+  const FrameSetup kept = setUp(nearer, {"volume.0.strays=keep"});
+  EXPECT_GT(maxComponent(kept.medium->bounds().extent()), 50.0);
+  EXPECT_FALSE(notes(kept, "left out"));
+  // Beside a grid, carriers out there are none either.
+  const std::string both = write("c.vdb", {volume::rasterize(withStray(50), {}).density,
+                                           volume::pointsToGrid(withStray(50), "points", 1)});
+  const FrameSetup grid = setUp(both, {"estimator.carrier=particles"});
+  EXPECT_LT(maxComponent(grid.medium->bounds().extent()), 3.0);
+  EXPECT_EQ(grid.particles.size(), withStray(50).size() - 1);
+}
+
+// Floats would not tell the voxels of one from those of the next a million units away.
+TEST_F(HardValues, WhatIsSeenLiesInTheMiddleOfLocalSpace) {
+  const std::string file = write("a.vdb", {ballGrid("density", Vec3d(0), 0.1)});
+  const FrameSetup setup = setUp(file, {"volume.1.file=\"" + file + "\"",
+                                        "volume.1.origin=[4e6, 0, 0]", "volume.1.density_scale=3"});
+  EXPECT_EQ(setup.medium->volumes().size(), 1u);
+  EXPECT_LT(glm::length(setup.space.center), 1e-6);
+  EXPECT_LT(glm::length(setup.medium->bounds().center()), 1e-6);
+}
+
+TEST_F(HardValues, ABareCacheIsScaledWhateverItsUnits) {
+  const auto scaleOf = [&](const std::string& file) {
+    return sceneForVolume(file, {}, false).volumes.front().values.vec3("density_scale").x;
+  };
+  const double usual = scaleOf(write("a.vdb", {ballGrid("density", Vec3d(0), 0.1, 1.0f)}));
+  for (const float value : {1e4f, 1e9f, 1e30f})
+    EXPECT_NEAR(scaleOf(write("b.vdb", {ballGrid("density", Vec3d(0), 0.1, value)})) *
+                    static_cast<double>(value) / usual,
+                1, 1e-5)
+        << value;
 }
 
 }  // namespace

@@ -47,6 +47,7 @@ const KeyCase kKeys[] = {
     {"volume.0", "velocity", "\"\""},
     {"volume.0", "transform", "[1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1]"},
     {"volume.0", "particle_radius", "0.0"},
+    {"volume.0", "strays", "\"leave_out\""},
     {"light.0", "type", "\"spot\""},
     {"light.0", "name", "\"key\""},
     {"light.0", "position", "[3, 2.5, 1]"},

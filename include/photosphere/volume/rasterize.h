@@ -2,9 +2,11 @@
 // Particles to density, and density to particles.
 
 #include <cstdint>
+#include <optional>
 
 #include "photosphere/volume/grid.h"
 #include "photosphere/volume/particle_set.h"
+#include "photosphere/volume/strays.h"
 
 namespace photosphere::volume {
 
@@ -16,6 +18,8 @@ struct RasterizeOptions {
   /// One radius for all [scene units]; 0 = `pscale` when some particle has one above 0, else twice
   /// the median spacing.
   double radius = 0;
+  bool leaveOutStrays = false;  ///< see Strays
+  Box3d within = {};            ///< particles outside are left out; empty = none [scene units]
 };
 
 struct RasterizeResult {
@@ -24,11 +28,12 @@ struct RasterizeResult {
   double radiusMin = 0, radiusMedian = 0, radiusMax = 0;
   bool radiusFromSpacing = false;
   double spacing = 0;        ///< medianSpacing() where the radius came from it, else 0
-  double massParticles = 0;  ///< sum over the particles
+  double massParticles = 0;  ///< sum over the particles that are rasterized
   double massGrid = 0;       ///< sum of density times voxel volume
   std::uint64_t skipped =
       0;  ///< particles with a position, radius or mass that is not finite or < 0
   std::uint64_t firstSkipped = 0;  ///< number of the first of them, from 0
+  std::optional<Strays> strays;    ///< that were left out
 };
 
 /// Mass of a particle: `mass`, else density * 4/3 pi r^3 with r its `pscale`, or the radius where

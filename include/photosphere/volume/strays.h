@@ -1,0 +1,44 @@
+#pragma once
+// What a simulation lost: a few particles or voxels so far from all else that the box around
+// everything says nothing of the smoke. A frame is laid out by that box: its positions are floats
+// about its middle, lamps shine on all of it, shadows and light lie in tables over it.
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "photosphere/core/types.h"
+#include "photosphere/volume/grid.h"
+#include "photosphere/volume/particle_set.h"
+
+namespace photosphere::volume {
+
+/// Particles or voxels that hold at most 0.5 % of the smoke, are at most 1 % of their kind, and lie
+/// farther than eight times the longest edge of the box around the rest from that box.
+struct Strays {
+  Box3d kept;               ///< holds all but them [scene units of the file]
+  std::uint64_t count = 0;  ///< how many they are
+  std::uint64_t all = 0;    ///< of how many
+  double share = 0;         ///< of the smoke: mass, or sum of values
+  double farthest = 0;      ///< from the box of the rest [scene units]
+  double size = 0;          ///< longest edge of that box [scene units]
+
+  /// "1 of 3001 particles (0.033 % of the smoke) lies up to 1e+06 units away from the rest, which
+  /// is 0.9 across".
+  std::string text(std::string_view kind) const;
+};
+
+/// Strays of the active voxels of scalar grids of one file, each of which counts as much as the
+/// others; empty handles are passed over. Values that are negative or not finite weigh nothing.
+/// @throws InputError for a grid that is not scalar, or not affine
+std::optional<Strays> findStrays(std::span<const Grid> grids);
+
+/// Strays of particles by their mass (rasterize's rule); those with a position or mass that is not
+/// finite are passed over.
+std::optional<Strays> findStrays(const ParticleSet& particles);
+
+/// A grid of any type without the active voxels outside a box of its own world space.
+Grid clipped(const Grid& grid, const Box3d& box);
+
+}  // namespace photosphere::volume
