@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "medium_setup.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/frames.h"
 #include "photosphere/scene/frame_setup.h"
@@ -125,11 +126,20 @@ std::vector<double> axisDepths(const transport::Medium& medium) {
   return depths;
 }
 
-double chooseScale(const transport::Medium& medium, std::vector<std::string>& choices) {
+// Whether a voxel is so deep that its density may have been cut off.
+bool isPastMeasure(const transport::Medium& medium) {
+  return static_cast<double>(medium.majorants().maximum()) * medium.voxelEdge() >
+         0.5 * kMostVoxelDepth;
+}
+constexpr double kThinner = 1e-6, kLeastProbe = 1e-80;
+
+// @param scaled  the density_scale that the medium has
+double chooseScale(const transport::Medium& medium, double scaled,
+                   std::vector<std::string>& choices) {
   const std::vector<double> depths = axisDepths(medium);
   if (depths.empty() || !(depths[depths.size() / 2] > 0)) return 1.0;
-  const double median = depths[depths.size() / 2];
-  const double high = depths[depths.size() * 9 / 10];
+  const double median = depths[depths.size() / 2] / scaled;
+  const double high = depths[depths.size() * 9 / 10] / scaled;
   const double scale = volume::roundedToTwoDigits(volume::kSmokeDepth / median);
   choices.push_back(
       fmt::format("density_scale = {:g}: the median optical depth along the axes becomes {:.1f} "
@@ -226,16 +236,25 @@ SceneFile sceneForVolume(const std::filesystem::path& path, const std::vector<st
   const std::string density =
       isSet(sets, "volume.0.density") ? "density" : chooseDensity(cache, choices);
 
-  // A first set-up at scale 1 says where the smoke is and how deep.
-  SceneFile probe =
-      parseScene(volumeText(pattern, density, 1.0), pattern, folder, volumeSets(sets));
-  probe.allowInvalid = allowInvalid;
-  const FrameSetup smoke = setUpFrame(probe, frame);
+  // A first set-up at scale 1 says where the smoke is and how deep: or at a lower one, where that
+  // would be past measure in a voxel.
+  double probed = 1;
+  const auto probeAt = [&](double scale) {
+    SceneFile probe =
+        parseScene(volumeText(pattern, density, scale), pattern, folder, volumeSets(sets));
+    probe.allowInvalid = allowInvalid;
+    return probe;
+  };
+  const SceneFile probe = probeAt(probed);
+  FrameSetup smoke = setUpFrame(probe, frame);
+  while (!isSet(sets, "volume.0.density_scale") && isPastMeasure(*smoke.medium) &&
+         probed > kLeastProbe)
+    smoke = setUpFrame(probeAt(probed *= kThinner), frame);
   if (smoke.worldBounds.empty())
     throw InputError(framePath(pattern, frame), fmt::format("grid '{}' holds no smoke", density));
   const double scale = isSet(sets, "volume.0.density_scale")
                            ? probe.volumes.front().values.vec3("density_scale").x
-                           : chooseScale(*smoke.medium, choices);
+                           : chooseScale(*smoke.medium, probed, choices);
   const Vec3d up = chooseUp(cache, smoke.worldBounds, choices);
   const Mat4d camera = frameBox(smoke.worldBounds, smoke.worldBounds.center(), up, kFov,
                                 Vec2i(probe.camera.vec2("resolution")));

@@ -33,8 +33,9 @@ void checkSamples(const render::FrameLayers& layers) {
   if (layers.nanSamples == 0 && layers.negativeSamples == 0) return;
   throw SampleError(
       fmt::format("{} samples are NaN or infinite and {} negative, the first in pixel "
-                  "({}, {}); the frame is not written. This is a defect: please report it "
-                  "with the scene",
+                  "({}, {}); the frame is not written. Light of 1e25 and more leaves what a float "
+                  "holds where smoke or the camera is close to its lamp: lower `intensity`, or "
+                  "`emission.scale`. Anything else is a defect: please report it with the scene",
                   layers.nanSamples, layers.negativeSamples, layers.firstBad.x, layers.firstBad.y),
       layers.nanSamples, layers.negativeSamples);
 }
