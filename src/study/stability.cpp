@@ -61,13 +61,17 @@ class Table {
     for (const StabilityCase& c : m_catalogue.cases) {
       if (!chosen(c) || (m_options.quick && !c.quick)) continue;
       m_frames.clear();
-      if (c.trace == "slab_radiance")
+      if (c.trace == "slab_radiance") {
         runSlabRadiance(c);
-      else if (!c.trace.empty())
+      } else if (!c.trace.empty()) {
         runTrace(c);
-      else
-        for (const StabilityEstimator* e : estimatorsOf(c))
+      } else {
+        const std::vector<const StabilityEstimator*> estimators = estimatorsOf(c);
+        if (estimators.empty() && m_options.estimators.empty())
+          throw ConfigError(fmt::format("{}: no estimator renders it in this size", c.name));
+        for (const StabilityEstimator* e : estimators)
           runFrame(c, *e);
+      }
     }
     return std::move(m_rows);
   }
@@ -108,10 +112,13 @@ class Table {
     };
     for (const std::string& name : m_options.estimators)
       if (!known(name)) refuse("--family", name);
-    for (const StabilityCase& c : m_catalogue.cases)
+    for (const StabilityCase& c : m_catalogue.cases) {
       for (const Sets* names : {&c.estimators, &c.quickEstimators})
         for (const std::string& name : *names)
           if (!known(name)) refuse(c.name, name);
+      for (const auto& [name, bound] : c.bounds)
+        if (!known(name)) refuse(c.name, name);
+    }
     for (const std::string& begin : m_options.cases)
       if (std::none_of(m_catalogue.cases.begin(), m_catalogue.cases.end(),
                        [&](const StabilityCase& c) { return beginsRow(c, begin); }))
@@ -141,7 +148,7 @@ class Table {
     row.estimator = estimator;
     row.hard = c.hard;
     row.oracle = c.oracle.source.empty() ? c.oracle.kind : c.oracle.source;
-    row.bound = m_options.quick ? c.quickBound : c.bound;
+    row.bound = c.boundOf(estimator, m_options.quick);
     return row;
   }
 
@@ -205,7 +212,23 @@ class Table {
     scene.scene.set("seed", scene.scene.integer("seed") + 1, "finer");
   }
 
-  // What the frame is held against, rendered once for all that ask for the same.
+  // The pixels of a whole frame that a crop keeps.
+  static StabilityFrame cut(const StabilityFrame& whole, const std::vector<int>& crop) {
+    StabilityFrame part = whole;
+    const int right = std::min(crop[2], whole.width), bottom = std::min(crop[3], whole.height);
+    part.width = std::max(0, right - crop[0]);
+    part.height = std::max(0, bottom - crop[1]);
+    part.pixels.clear();
+    for (int y = crop[1]; y < bottom; ++y)
+      for (int x = crop[0]; x < right; ++x)
+        for (int channel = 0; channel < 3; ++channel)
+          part.pixels.push_back(
+              whole.pixels[static_cast<std::size_t>(3 * (y * whole.width + x) + channel)]);
+    return part;
+  }
+
+  // What the frame is held against, rendered once for all that ask for the same. A crop is held
+  // against that part of the whole frame.
   const StabilityFrame& reference(const StabilityCase& c, const StabilityEstimator& e) {
     const StabilityOracle& o = c.oracle;
     Sets sets;
@@ -226,9 +249,12 @@ class Table {
     const auto known = m_frames.find(key);
     if (known != m_frames.end()) return known->second;
     StabilityFrameJob job = jobOf(c, smoke, sets, o.kind == "same" ? 0 : c.lights);
+    job.request.crop.reset();
     if (o.kind == "finer") makeFiner(job.scene);
     job.cpuLimit *= kFiner;
-    return m_frames.emplace(key, renderStabilityFrame(job)).first->second;
+    StabilityFrame frame = renderStabilityFrame(job);
+    if (c.crop.size() == 4 && !frame.failed) frame = cut(frame, c.crop);
+    return m_frames.emplace(key, std::move(frame)).first->second;
   }
 
   void runFrame(const StabilityCase& c, const StabilityEstimator& e) {
@@ -279,6 +305,8 @@ class Table {
       for (const double v : frame.pixels)
         row.error = std::isfinite(v) ? std::max(row.error, std::abs(v) / c.oracle.value)
                                      : std::numeric_limits<double>::infinity();
+      if (!(meanOf(frame) >= c.oracle.least)) row.error = std::numeric_limits<double>::infinity();
+      if (c.oracle.least > 0) row.expected = fmt::format("{:g} ", c.oracle.least) + row.expected;
     } else if (c.oracle.kind == "value") {
       StabilityFrame flat = frame;
       std::fill(flat.pixels.begin(), flat.pixels.end(), c.oracle.value);
@@ -319,8 +347,11 @@ class Table {
             StabilityRow& row) const {
     const double scale = c.oracle.scale;
     row.expected = numberText(meanOf(other) * scale);
-    row.error = blockError(
-        frame, other, c.metric == "mean" ? std::max(frame.width, frame.height) : c.block, scale);
+    // Blocks that are alike may all be too bright: the mean is judged beside them.
+    const int whole = std::max(frame.width, frame.height);
+    row.error = blockError(frame, other, whole, scale);
+    if (c.metric != "mean")
+      row.error = std::max(row.error, blockError(frame, other, c.block, scale));
   }
 
   static void judgeError(const StabilityCase& c, const StabilityFrame& frame, StabilityRow& row) {
@@ -357,11 +388,19 @@ class Table {
     row.name = nameOf(c, slab);
     std::uint64_t violations = 0;
     for (const SlabRadiance::Direction& d : slab.directions) {
-      Sets sets = c.set;
-      append(sets, slab.settings(d));
-      append(sets, e.set);
-      const StabilityFrame frame = renderStabilityFrame(jobOf(c, slab.smoke(), sets, 0));
-      row.seconds += frame.seconds;
+      // Where few photons leave, as the frame itself tells, more are traced.
+      StabilityFrame frame;
+      for (int effort = 0; effort < SlabRadiance::kEfforts; ++effort) {
+        if (effort > 0 &&
+            !(meanOf(frame) < SlabRadiance::kDim.at(static_cast<std::size_t>(effort) - 1)))
+          break;
+        Sets sets = c.set;
+        append(sets, slab.settings(d, effort));
+        append(sets, e.set);
+        frame = renderStabilityFrame(jobOf(c, slab.smoke(), sets, 0));
+        row.seconds += frame.seconds;
+        if (frame.failed) break;
+      }
       row.nanSamples += frame.nanSamples;
       row.negativeSamples += frame.negativeSamples;
       if (frame.failed) {

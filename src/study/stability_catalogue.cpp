@@ -115,6 +115,7 @@ void readOracle(TableReader& from, StabilityOracle& oracle) {
   from.text("source", oracle.source);
   from.number("value", oracle.value);
   from.number("scale", oracle.scale);
+  from.number("least", oracle.least);
   from.number("code", oracle.code);
   from.text("message", oracle.message);
   from.number("samples", oracle.samples);
@@ -152,6 +153,10 @@ StabilityCase readCase(const toml::table& table, const std::string& file, const 
   from.number("bound", c.bound);
   c.quickBound = c.bound;
   from.number("quick_bound", c.quickBound);
+  SmokeSpec bounds;
+  from.values("bounds", bounds);
+  for (const auto& [name, value] : bounds.numbers)
+    c.bounds[name] = value.front();
   const toml::node* oracle = from.find("oracle");
   from.finish();
   if (c.name.empty() || c.hard.empty()) from.refuse("a case needs 'name' and 'hard'");

@@ -24,6 +24,7 @@ struct StabilityOracle {
   std::string kind;              ///< finer, path, same, value, zero, error; of traces: see README
   std::string source;            ///< for people: where the value comes from
   double value = 0, scale = 1;   ///< of `value`; of `same`: factor on the other picture
+  double least = 0;              ///< of `below`: what the mean must reach
   int code = 0;                  ///< of `error`: exit code
   std::string message;           ///< of `error`: what it must say
   int samples = 0;               ///< of `path`: paths a pixel; 0 = the scene's
@@ -53,6 +54,12 @@ struct StabilityCase {
   std::string writes;  ///< `float` or `half`: what the file must hold
   StabilityOracle oracle;
   double bound = 0.2, quickBound = 0;
+  std::map<std::string, double> bounds;  ///< of estimators that have one of their own
+
+  double boundOf(const std::string& estimator, bool small) const {
+    const auto own = bounds.find(estimator);
+    return own != bounds.end() ? own->second : small ? quickBound : bound;
+  }
 };
 
 /// A way to render that every case is tried with.

@@ -24,18 +24,19 @@ const std::vector<Rgb>& layerOf(const render::FrameLayers& layers, const std::st
   return layers.beauty;
 }
 
-// Type of the colour channels as they came back, and what is not finite in them.
+// Type of the colour channels as they came back, and what is not finite in any of the file's.
 std::string writtenType(scene::FrameResult& frame, const StabilityFrameJob& job) {
   scene::WriteRequest request;
   request.path = job.exr.string();
   scene::FrameWriter(job.scene, request).write(frame);
   const image::ExrFile file = image::readExr(job.exr);
+  for (const image::Channel& channel : file.image.channels())
+    for (const float v : channel.pixels)
+      if (!std::isfinite(v)) return fmt::format("{} in channel {}", v, channel.name);
   bool isHalf = true;  // what it could not hold would be infinite
   for (const char* name : {"R", "G", "B"})
-    for (const float v : file.image.channel(name)) {
-      if (!std::isfinite(v)) return fmt::format("{} in channel {}", v, name);
+    for (const float v : file.image.channel(name))
       isHalf = isHalf && std::abs(v) <= 65504.0f;
-    }
   return isHalf ? "half" : "float";
 }
 

@@ -19,10 +19,8 @@ double halfWidth(double tau) {
   return 3 * tau + 18;
 }
 constexpr double kSeen = 3;
-// Light that so few photons of a case reach takes more of them.
-constexpr double kFaint = 1e-3, kDim = 1e-2;
-constexpr const char* kFaintPhotons = "estimator.photons=32000000";
-constexpr const char* kDimPhotons = "estimator.photons=8000000";
+// Of efforts beyond the first.
+constexpr const char* kPhotons[] = {"estimator.photons=8000000", "estimator.photons=32000000"};
 
 }  // namespace
 
@@ -37,12 +35,12 @@ SmokeSpec SlabRadiance::smoke() const {
   return spec;
 }
 
-std::vector<std::string> SlabRadiance::settings(const Direction& d) const {
+std::vector<std::string> SlabRadiance::settings(const Direction& d, int effort) const {
   const double s = std::sqrt(std::max(0.0, 1 - d.mu * d.mu)), side = d.top ? 1 : -1;
   const double far = 4 * halfWidth(tau);
   // Across the plane in which the view is tilted, more of the slab is seen at the same distance
   // from its sides.
-  const bool faint = d.value < kFaint;
+  const bool faint = effort == kEfforts - 1;
   const int rows = faint ? 8 * std::max(1, static_cast<int>(halfWidth(tau) / (3 * kSeen))) : 8;
   std::vector<std::string> sets{
       "volume.0.density_scale=1", fmt::format("volume.0.albedo={}", albedo),
@@ -51,7 +49,7 @@ std::vector<std::string> SlabRadiance::settings(const Direction& d) const {
       fmt::format("camera={{ type = \"orthographic\", position = [{}, 0, {}], look_at = [0, 0, "
                   "0], up = [0, 1, 0], width = {}, resolution = [8, {}] }}",
                   s * far, side * d.mu * far, 2 * kSeen, rows)};
-  if (d.value < kDim) sets.emplace_back(faint ? kFaintPhotons : kDimPhotons);
+  if (effort > 0) sets.emplace_back(kPhotons[effort - 1]);
   return sets;
 }
 

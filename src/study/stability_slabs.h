@@ -2,6 +2,7 @@
 // Radiance that leaves plane-parallel slabs, against the reference values of
 // data/reference/slab.csv.
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -23,7 +24,11 @@ struct SlabRadiance {
   /// the optical depth alone.
   SmokeSpec smoke() const;
   /// Settings over the base scene: medium, lamp, a camera of parallel rays.
-  std::vector<std::string> settings(const Direction& direction) const;
+  /// @param effort  0 = the case's photons; 1 and 2 = more, for directions in which few leave
+  std::vector<std::string> settings(const Direction& direction, int effort) const;
+  static constexpr int kEfforts = 3;
+  /// Radiance per unit irradiance below which effort 1 and 2 are called for [1/sr].
+  static constexpr std::array<double, kEfforts - 1> kDim{1e-2, 1e-3};
 };
 
 /// Slabs of `g` with tau <= 8 and their directions of mu >= 0.3. @param quick  tau 2, three mu

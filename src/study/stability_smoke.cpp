@@ -141,14 +141,12 @@ class Smoke {
     return m_spec.number("frustum", 0) > 0 ? volume::inFrustum(grid) : grid;
   }
 
+  // Beyond the smoke's box lies a background that would carry it off.
   Grid velocity() const {
     const Lattice l = lattice();
-    const Vec3d v = asVector(m_spec.list("velocity"), Vec3d(0.0));
-    std::vector<float> values;
-    for (int i = 0; i < l.count.x * l.count.y * l.count.z; ++i)
-      for (int a = 0; a < 3; ++a)
-        values.push_back(static_cast<float>(v[a]));
-    return volume::denseVectorToGrid("v", l.count, values, l.fileFromIndex, l.first);
+    return volume::constantVectorGrid("v", {l.first, l.first + l.count - 1},
+                                      Vec3f(asVector(m_spec.list("velocity"), Vec3d(0.0))),
+                                      Vec3f(1e3f), l.fileFromIndex);
   }
 
   // Particles drawn from the blob's density, or all at one place.
@@ -167,6 +165,10 @@ class Smoke {
         set.positions.push_back(asVector(at, Vec3d(0.0)));
       else if (taken)
         set.positions.push_back(m_center + m_size * q);
+    }
+    if (m_spec.numbers.contains("stray")) {
+      set.positions.push_back(asVector(m_spec.list("stray"), Vec3d(0.0)));
+      ++count;
     }
     const double pscale = m_spec.number("pscale", 0.1 * m_size);
     std::vector<float> radii(count, static_cast<float>(pscale));

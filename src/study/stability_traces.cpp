@@ -9,8 +9,9 @@
 
 #include "child.h"
 #include "photosphere/core/error.h"
+#include "photosphere/core/fixed_point.h"
 #include "photosphere/core/sampling.h"
-#include "photosphere/estimators/light_field.h"
+#include "photosphere/estimators/light_sums.h"
 #include "photosphere/transport/photon_tracer.h"
 
 namespace photosphere::study {
@@ -140,7 +141,7 @@ void runFlux(const StabilityCase& c, bool quick, StabilityRow& row) {
   else if (kind == "semi_infinite")
     judge(semiInfiniteReflectance(albedo, beam), reflected, row);
   else if (kind == "conserved")
-    judge(1, reflected + through + absorbed + row.cappedPower, row);
+    judge(1, reflected + through + row.cappedPower, row);  // albedo 1: nothing is absorbed
   else
     throw ConfigError(fmt::format("{}: slab_flux has no oracle '{}'", c.name, kind));
   row.message = fmt::format("R {:.6g}, T {:.6g}, absorbed {:.6g}, capped {:.3g}, {:.0f} photons",
@@ -150,8 +151,8 @@ void runFlux(const StabilityCase& c, bool quick, StabilityRow& row) {
   if (violations > 0) row.message += fmt::format(", {} majorants exceeded", violations);
 }
 
-// All the light that a field stores.
-double storedLight(double excess, std::uint64_t photons) {
+// Sums of photons' bins in a slab. @param excess  power of each, over one photon's share
+estimators::LightSums storedSums(double excess, std::uint64_t photons) {
   const transport::Medium medium = slab(2, 1, 0);
   estimators::LightFieldLayout layout;
   layout.basis = estimators::Basis::histogram;
@@ -162,30 +163,74 @@ double storedLight(double excess, std::uint64_t photons) {
   options.photons = photons;
   options.key = RandomKey::fromSeed(3, 0);
   transport::TraceStatistics statistics;
-  const estimators::LightField field = traceLightField(medium, lampAt(1, false, excess), layout,
-                                                       estimators::View{}, {}, options, statistics);
-  double sum = 0;
-  for (const float value : field.values)
-    sum += static_cast<double>(value);
-  return sum;
+  return traceLightSums(medium, lampAt(1, false, excess), layout, estimators::View{}, {}, options,
+                        statistics);
+}
+
+// All the light that a field stores.
+double lightOf(estimators::LightSums sums) {
+  double light = 0;
+  for (const float value : toField(std::move(sums)).values)
+    light += static_cast<double>(value);
+  return light;
+}
+
+void judgeRefusal(const StabilityCase& c, const ChildResult& child, StabilityRow& row) {
+  row.expected = fmt::format("exit {}", c.oracle.code);
+  row.result = fmt::format("exit {}", static_cast<int>(child.code));
+  row.message = child.message;
+  row.passed = child.failed && static_cast<int>(child.code) == c.oracle.code &&
+               child.message.find(c.oracle.message) != std::string::npos;
+  row.error = row.passed ? 0 : 1;
+}
+
+// Sums that hold so many times what some photons leave must go on to count these, to the last unit:
+// added as a shard, and one by one as deposits.
+std::string countWork(std::int64_t times, std::uint64_t photons) {
+  const estimators::LightSums few = storedSums(1, photons);
+  estimators::LightSums many = few;
+  for (std::int64_t& sum : many.sums)
+    sum *= times;
+  FixedSums deposits;
+  deposits.sums = many.sums;
+  addSums(many, few);
+  std::uint64_t wrong = 0, counted = 0;
+  for (std::size_t i = 0; i < few.sums.size(); ++i) {
+    counted += few.sums[i] > 0;
+    for (int k = 0; k < 3; ++k)
+      deposits.add(i, deposits.quantum, 0x80000000u);
+    wrong += many.sums[i] != few.sums[i] * (times + 1);
+    wrong += deposits.sums[i] != few.sums[i] * times + 3;
+  }
+  wrong += deposits.overflows.load();
+  return json{{"wrong", wrong},
+              {"counted", counted},
+              {"few", lightOf(few)},
+              {"many", lightOf(std::move(many))}}
+      .dump();
 }
 
 void runSums(const StabilityCase& c, StabilityRow& row) {
-  const double excess = std::exp2(c.slab.number("excess", 0));
   constexpr std::uint64_t photons = 1000;
-  const ChildResult plain = runInChild([] { return fmt::format("{}", storedLight(1, photons)); });
-  const ChildResult child =
-      runInChild([&] { return fmt::format("{}", storedLight(excess, photons)); });
-  row.seconds = child.seconds;
-  if (c.oracle.kind == "error") {
-    row.expected = fmt::format("exit {}", c.oracle.code);
-    row.result = fmt::format("exit {}", static_cast<int>(child.code));
+  if (const double times = c.slab.number("times", 0); times > 0) {
+    const ChildResult child =
+        runInChild([&] { return countWork(static_cast<std::int64_t>(times), photons); });
+    row.seconds = child.seconds;
     row.message = child.message;
-    row.passed = child.failed && static_cast<int>(child.code) == c.oracle.code &&
-                 child.message.find(c.oracle.message) != std::string::npos;
-    row.error = row.passed ? 0 : 1;
+    if (child.failed) return;
+    const json v = json::parse(child.text);
+    judge(v.at("few").get<double>() * (times + 1), v.at("many"), row);
+    const std::uint64_t wrong = v.at("wrong"), counted = v.at("counted");
+    row.message = fmt::format("{} bins counted, {} sums wrong", counted, wrong);
+    row.passed = row.passed && wrong == 0 && counted > 0;
     return;
   }
+  const double excess = std::exp2(c.slab.number("excess", 0));
+  const auto light = [](double by) { return fmt::format("{}", lightOf(storedSums(by, photons))); };
+  const ChildResult plain = runInChild([&] { return light(1); });
+  const ChildResult child = runInChild([&] { return light(excess); });
+  row.seconds = child.seconds;
+  if (c.oracle.kind == "error") return judgeRefusal(c, child, row);
   row.message = child.failed ? child.message : plain.message;
   if (child.failed || plain.failed) return;
   judge(std::stod(plain.text) * excess, std::stod(child.text), row);

@@ -124,6 +124,19 @@ Grid constantGrid(std::string_view name, const Box3i& box, float value,
   return Grid(grid);
 }
 
+Grid constantVectorGrid(std::string_view name, const Box3i& box, const Vec3f& value,
+                        const Vec3f& background, const Mat4d& worldFromIndex) {
+  initializeOpenVdb();
+  const auto grid =
+      openvdb::Vec3SGrid::create(openvdb::Vec3f(background.x, background.y, background.z));
+  grid->denseFill(openvdb::CoordBBox(openvdb::Coord(box.min.x, box.min.y, box.min.z),
+                                     openvdb::Coord(box.max.x, box.max.y, box.max.z)),
+                  openvdb::Vec3f(value.x, value.y, value.z));
+  grid->setTransform(makeTransform(worldFromIndex));
+  grid->setName(std::string(name));
+  return Grid(grid);
+}
+
 Grid inFrustum(const Grid& grid) {
   const openvdb::FloatGrid& from = floats(grid);
   const openvdb::CoordBBox box = from.evalActiveVoxelBoundingBox();

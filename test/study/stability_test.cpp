@@ -132,6 +132,51 @@ TEST(Stability, RowsPassWhenTheAnswerIsThat) {
   EXPECT_FALSE(rows[2].passed);
 }
 
+// A frame that is too bright by a tenth in every block, and one that is black where it must not be.
+TEST(Stability, MeansFloorsAndBoundsOfTheirOwn) {
+  const std::string one = "[[case]]\nhard = \"-\"\nestimators = [\"single\"]\n";
+  const std::string brighter =
+      "oracle = { kind = \"same\", bare = true }\n"
+      "set = [\"light.0.intensity=22\"]\n";
+  const auto rows = rowsOf(
+      one + "name = \"few\"\nbound = 0.05\n" + brighter + one +
+      "name = \"own\"\nbound = 0.05\nbounds = { single = 0.11 }\n" + brighter + one +
+      "name = \"dark\"\nset = [\"light.0.intensity=0\"]\nbound = 1\n"
+      "oracle = { kind = \"below\", value = 1, least = 1e-3 }\n" +
+      one + "name = \"lit\"\nbound = 1\noracle = { kind = \"below\", value = 1, least = 1e-3 }\n");
+  ASSERT_EQ(rows.size(), 4u);
+  EXPECT_FALSE(rows[0].passed);
+  EXPECT_NEAR(rows[0].error, 0.1, 0.01);
+  EXPECT_TRUE(rows[1].passed) << rows[1].error;
+  EXPECT_FALSE(rows[2].passed);
+  EXPECT_TRUE(rows[3].passed) << rows[3].message;
+  EXPECT_NE(complaintAbout(one + "name = \"a\"\nbounds = { vew = 1 }\noracle = { kind = "
+                                 "\"zero\" }\n")
+                .find("no estimator of the catalogue is named 'vew'"),
+            std::string::npos);
+}
+
+TEST(Stability, CropsAreHeldAgainstThatPartOfTheWholeFrame) {
+  const std::string one =
+      "[[case]]\nhard = \"-\"\nestimators = [\"single\"]\nbound = 0\noracle = { kind = \"same\" "
+      "}\n";
+  const auto rows = rowsOf(one + "name = \"part\"\ncrop = [9, 3, 26, 14]\n" + one +
+                           "name = \"past\"\ncrop = [24, 8, 1000, 1000]\n");
+  ASSERT_EQ(rows.size(), 2u);
+  for (const StabilityRow& row : rows) {
+    EXPECT_TRUE(row.passed) << row.name << ' ' << row.error;
+    EXPECT_NE(row.result, "0");
+  }
+  EXPECT_NE(rows[0].result, rows[1].result);
+}
+
+TEST(Stability, ACaseThatNobodyRendersIsRefused) {
+  EXPECT_NE(complaintAbout("[[case]]\nname = \"a\"\nhard = \"-\"\nestimators = [\"particles\"]\n"
+                           "oracle = { kind = \"zero\" }\n")
+                .find("a: no estimator renders it in this size"),
+            std::string::npos);
+}
+
 TEST(Stability, TheDigestNamesTheRowThatIsClosestToItsBound) {
   const auto row = [](const char* kind, const char* name, double error, double bound) {
     StabilityRow r;

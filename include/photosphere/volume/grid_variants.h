@@ -17,6 +17,11 @@ Grid ofType(const Grid& grid, std::string_view type);
 Grid constantGrid(std::string_view name, const Box3i& box, float value,
                   const Mat4d& worldFromIndex);
 
+/// One constant vector over a box of voxels, inclusive: active ones, of length 0 too, beside a
+/// background of `background`.
+Grid constantVectorGrid(std::string_view name, const Box3i& box, const Vec3f& value,
+                        const Vec3f& background, const Mat4d& worldFromIndex);
+
 /// The same voxels under a frustum transform, which no matrix describes.
 /// @throws InputError for a grid that is no float grid
 Grid inFrustum(const Grid& grid);
