@@ -105,10 +105,8 @@ std::string radiusRule(const volume::RasterizeResult& result, const ConvertOptio
 
 void addDensity(caches::CacheContent& content, const ConvertOptions& options) {
   ParticleSet& set = content.particles.front();
-  volume::RasterizeResult result =
-      volume::rasterize(set, {.voxelSize = options.voxelSize,
-                              .radius = options.radius,
-                              .leaveOutStrays = true});
+  volume::RasterizeResult result = volume::rasterize(
+      set, {.voxelSize = options.voxelSize, .radius = options.radius, .leaveOutStrays = true});
   const double difference =
       result.massParticles > 0 ? std::abs(result.massGrid / result.massParticles - 1) : 0;
   printLine("  radius     median {:.6g}: {}", result.radiusMedian, radiusRule(result, options));
