@@ -105,8 +105,9 @@ std::string radiusRule(const volume::RasterizeResult& result, const ConvertOptio
 
 void addDensity(caches::CacheContent& content, const ConvertOptions& options) {
   ParticleSet& set = content.particles.front();
-  volume::RasterizeResult result = volume::rasterize(
-      set, {.voxelSize = options.voxelSize, .radius = options.radius, .leaveOutStrays = true});
+  volume::RasterizeResult result = volume::rasterize(set, {.voxelSize = options.voxelSize,
+                                                           .radius = options.radius,
+                                                           .leaveOutStrays = !options.keepStrays});
   const double difference =
       result.massParticles > 0 ? std::abs(result.massGrid / result.massParticles - 1) : 0;
   printLine("  radius     median {:.6g}: {}", result.radiusMedian, radiusRule(result, options));
@@ -123,7 +124,7 @@ void addDensity(caches::CacheContent& content, const ConvertOptions& options) {
         "they are kept as points and left out of the density",
         result.skipped);
   if (result.strays)
-    log::warning("{}: they are kept as points and left out of the density",
+    log::warning("{}; kept as points, and left out of the density (--keep-strays keeps them there)",
                  result.strays->text("particles"));
   if (!set.find("pscale"))
     // Renderers take the radius from here: without it the points would not say what they weigh.

@@ -14,6 +14,7 @@ struct ConvertOptions {
   Placement placement;
   std::string density = "density";  ///< name of the density grid that is the medium
   double radius = 0;                ///< of particles [scene units]; 0 = chosen
+  bool keepStrays = false;          ///< in the density that is made of particles
   double voxelSize = 0;             ///< of the rasterized grid [scene units]; 0 = chosen
   std::uint64_t particles = 60000;  ///< seeded where there are grids only
   std::uint64_t seed = 1;

@@ -121,8 +121,15 @@ std::vector<double> axisDepths(const transport::Medium& medium) {
       largest = std::max(largest, depth);
       depths.push_back(depth);
     }
-  std::erase_if(depths, [&](double d) { return !(d > volume::kTraceDepth * largest); });
   std::sort(depths.begin(), depths.end());
+  // A voxel that is out of all measure is not what the smoke is like.
+  constexpr double kMeasure = 1e6;
+  const auto smoke = std::upper_bound(depths.begin(), depths.end(), 0.0);
+  if (smoke != depths.end()) {
+    const double usual = *(smoke + (depths.end() - smoke) * 19 / 20);
+    if (largest > kMeasure * usual) largest = usual;
+  }
+  std::erase_if(depths, [&](double d) { return !(d > volume::kTraceDepth * largest); });
   return depths;
 }
 

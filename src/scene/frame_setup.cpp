@@ -263,6 +263,18 @@ bool isOffCenter(const FrameSetup& setup) {
              std::max(kFarVoxels * setup.medium->voxelEdge(), glm::length(box.extent()));
 }
 
+// Whether the camera sees none of the smoke.
+bool isOutOfView(const SceneFile& scene, const FrameSetup& setup) {
+  const Box3d& box = setup.medium->bounds();
+  return box.empty() || isUnseen(scene, setup, box);
+}
+
+SceneFile withStrays(SceneFile scene) {
+  for (VolumeEntry& volume : scene.volumes)
+    volume.values.set("strays", std::string("keep"), volume.where);
+  return scene;
+}
+
 // @param center  of local space, world space; nothing = the middle of all smoke
 FrameSetup setUpAbout(const std::optional<Vec3d>& center, const SceneFile& scene,
                       std::int64_t frame, const SetupOptions& options) {
@@ -297,12 +309,16 @@ FrameSetup setUpAbout(const std::optional<Vec3d>& center, const SceneFile& scene
 FrameSetup setUpFrame(const SceneFile& written, std::int64_t frame, const SetupOptions& options) {
   const SceneFile scene = sceneOfFrame(written, frame, options);
   FrameSetup setup = setUpAbout({}, scene, frame, options);
-  if (!isOffCenter(setup)) return setup;
-  // The volumes that were left out as unseen lay far from the others.
-  FrameSetup nearer = setUpAbout(setup.worldBounds.center(), scene, frame, options);
-  nearer.readSeconds += setup.readSeconds;
-  nearer.rasterizeSeconds += setup.rasterizeSeconds;
-  return nearer;
+  const bool onlyStraysSeen = setup.leftStrays && isOutOfView(scene, setup);
+  if (!onlyStraysSeen && !isOffCenter(setup)) return setup;
+  const double read = setup.readSeconds, rasterize = setup.rasterizeSeconds;
+  std::optional<Vec3d> center;
+  if (!onlyStraysSeen) center = setup.worldBounds.center();  // what is unseen lay far from the rest
+  setup = {};                                                // there may be no room for both
+  setup = setUpAbout(center, onlyStraysSeen ? withStrays(scene) : scene, frame, options);
+  setup.readSeconds += read;
+  setup.rasterizeSeconds += rasterize;
+  return setup;
 }
 
 bool storesLight(const SceneFile& scene, const FrameSetup& setup) {

@@ -197,6 +197,7 @@ void buildMedium(const SceneFile& scene, std::int64_t cacheFrame, bool wantParti
     sources.push_back(readVolume(scene, entry, cacheFrame, {wantParticles, glows, moves}));
     setup.readSeconds += sources.back().readSeconds;
     setup.rasterizeSeconds += sources.back().rasterizeSeconds;
+    setup.leftStrays = setup.leftStrays || !sources.back().kept.empty();
     setup.worldBounds.grow(sources.back().bounds());
     for (const std::string& note : sources.back().notes)
       setup.notes.push_back(note);

@@ -215,12 +215,13 @@ class Table {
   // The pixels of a whole frame that a crop keeps.
   static StabilityFrame cut(const StabilityFrame& whole, const std::vector<int>& crop) {
     StabilityFrame part = whole;
-    const int right = std::min(crop[2], whole.width), bottom = std::min(crop[3], whole.height);
-    part.width = std::max(0, right - crop[0]);
-    part.height = std::max(0, bottom - crop[1]);
+    const int left = std::max(crop[0], 0), right = std::min(crop[2], whole.width);
+    const int top = std::max(crop[1], 0), bottom = std::min(crop[3], whole.height);
+    part.width = std::max(0, right - left);
+    part.height = std::max(0, bottom - top);
     part.pixels.clear();
-    for (int y = crop[1]; y < bottom; ++y)
-      for (int x = crop[0]; x < right; ++x)
+    for (int y = top; y < bottom; ++y)
+      for (int x = left; x < right; ++x)
         for (int channel = 0; channel < 3; ++channel)
           part.pixels.push_back(
               whole.pixels[static_cast<std::size_t>(3 * (y * whole.width + x) + channel)]);
@@ -399,15 +400,15 @@ class Table {
         append(sets, e.set);
         frame = renderStabilityFrame(jobOf(c, slab.smoke(), sets, 0));
         row.seconds += frame.seconds;
+        row.nanSamples += frame.nanSamples;
+        row.negativeSamples += frame.negativeSamples;
+        violations += frame.majorantViolations;
         if (frame.failed) break;
       }
-      row.nanSamples += frame.nanSamples;
-      row.negativeSamples += frame.negativeSamples;
       if (frame.failed) {
         fail(row, frame.message);
         return finish(std::move(row));
       }
-      violations += frame.majorantViolations;
       const double error = std::abs(meanOf(frame) / d.value - 1);
       if (error < row.error && !row.result.empty()) continue;
       row.error = error;

@@ -224,12 +224,14 @@ RasterizeResult rasterize(const ParticleSet& particles, const RasterizeOptions& 
   RasterizeResult result;
   std::vector<Blob> blobs = collectBlobs(particles, options, result);
   if (options.leaveOutStrays) result.strays = findStrays(blobs);
-  if (const Box3d& within = result.strays ? result.strays->kept : options.within; !within.empty())
+  if (const Box3d& within = result.strays ? result.strays->kept : options.within; !within.empty()) {
     std::erase_if(blobs, [&](const Blob& blob) {
       const bool out = !within.contains(blob.position);
       if (out) result.massParticles -= blob.mass;
       return out;
     });
+    summarizeRadii(blobs, result);
+  }
   if (options.voxelSize == 0) checkRadii(result);
   result.voxelSize = chooseVoxelSize(blobs, options, result.radiusMedian);
   std::vector<Vec3d> positions;

@@ -39,6 +39,8 @@ const Attribute* scalarColumn(const ParticleSet& particles, std::string_view nam
   return column && column->arity >= 1 && column->size() >= particles.size() ? column : nullptr;
 }
 
+}  // namespace
+
 void summarizeRadii(const std::vector<Blob>& blobs, RasterizeResult& result) {
   if (blobs.empty()) return;
   std::vector<double> radii(blobs.size());
@@ -50,8 +52,6 @@ void summarizeRadii(const std::vector<Blob>& blobs, RasterizeResult& result) {
   result.radiusMin = *std::min_element(radii.begin(), radii.end());
   result.radiusMax = *std::max_element(radii.begin(), radii.end());
 }
-
-}  // namespace
 
 namespace {
 

@@ -20,6 +20,9 @@ struct Blob {
 std::vector<Blob> collectBlobs(const ParticleSet& particles, const RasterizeOptions& options,
                                RasterizeResult& result);
 
+/// Radii of particles, for `result`.
+void summarizeRadii(const std::vector<Blob>& blobs, RasterizeResult& result);
+
 /// Strays of them, by their masses.
 std::optional<Strays> findStrays(const std::vector<Blob>& blobs);
 

@@ -13,6 +13,7 @@ namespace photosphere::volume {
 /// A particle with its radius, or a block of voxels.
 struct Lump {
   Box3d box;
+  Vec3d at;           ///< where it counts as being: inside the box
   double weight = 0;  ///< finite, not negative
   std::uint64_t count = 1;
 };
@@ -21,7 +22,7 @@ namespace strays {
 
 inline constexpr double kMostShare = 0.005, kMostCount = 0.01;
 /// Distance from the rest, in longest edges of its box.
-inline constexpr double kReach = 8;
+inline constexpr double kReach = 64;
 
 /// Weights along one axis of a box, and what lies below and above it.
 class Profile {
@@ -66,7 +67,7 @@ std::optional<Strays> searchStrays(std::size_t count, const LumpAt& lump) {
   double all = 0;
   for (std::size_t i = 0; i < count; ++i) {
     const Lump piece = lump(i);
-    middle.grow(piece.box.center());
+    middle.grow(piece.at);
     all += piece.weight;
     found.all += piece.count;
   }
@@ -83,7 +84,7 @@ std::optional<Strays> searchStrays(std::size_t count, const LumpAt& lump) {
       strays::Profile profile(before.min[axis], before.max[axis]);
       for (std::size_t i = 0; i < count; ++i) {
         const Lump piece = lump(i);
-        profile.add(piece.box.center()[axis], piece.weight);
+        profile.add(piece.at[axis], piece.weight);
       }
       const auto [low, high] = profile.within(strays::kMostShare * all);
       middle.min[axis] = low;
@@ -93,19 +94,22 @@ std::optional<Strays> searchStrays(std::size_t count, const LumpAt& lump) {
   }
   Box3d rest;
   for (std::size_t i = 0; i < count; ++i)
-    if (const Lump piece = lump(i); middle.contains(piece.box.center())) rest.grow(piece.box);
+    if (const Lump piece = lump(i); middle.contains(piece.at)) rest.grow(piece.box);
   if (rest.empty()) return std::nullopt;
   found.size = maxComponent(rest.extent());
   found.kept = {glm::max(rest.min - strays::kReach * found.size, glm::min(whole.min, rest.min)),
                 glm::min(rest.max + strays::kReach * found.size, glm::max(whole.max, rest.max))};
+  const Box3d near = found.kept;
   double outside = 0;
   for (std::size_t i = 0; i < count; ++i) {
     const Lump piece = lump(i);
-    const Vec3d center = piece.box.center();
-    if (found.kept.contains(center)) continue;
+    if (near.contains(piece.at)) {
+      found.kept.grow(piece.box);
+      continue;
+    }
     outside += piece.weight;
     found.count += piece.count;
-    found.farthest = std::max(found.farthest, glm::length(center - rest.nearest(center)));
+    found.farthest = std::max(found.farthest, glm::length(piece.at - rest.nearest(piece.at)));
   }
   found.share = outside / all;
   if (found.count == 0 || found.share > strays::kMostShare ||

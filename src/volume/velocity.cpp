@@ -136,10 +136,12 @@ Grid velocityOfParticles(const ParticleSet& particles, const std::string& attrib
                                        attribute));
   // Masses are not negative: a velocity that all share is added first and taken away again.
   double shift = 0;
-  for (std::size_t i = 0; i < particles.size(); ++i)
+  for (std::size_t i = 0; i < particles.size(); ++i) {
+    if (!options.within.empty() && !options.within.contains(particles.positions[i])) continue;
     for (int c = 0; c < 3; ++c)
       if (const double value = std::abs(v->number(i, c)); std::isfinite(value))
         shift = std::max(shift, value);
+  }
   RasterizeOptions same = options;
   const RasterizeResult density = rasterize(particles, same);
   same.voxelSize = density.voxelSize;

@@ -133,17 +133,26 @@ TEST_F(HardValues, StraysAreLeftOutUnlessTheSceneKeepsThem) {
     EXPECT_LT(glm::length(setup.space.center), 0.1);
     EXPECT_EQ(setup.medium->isMoving(), !sets.empty());
   }
-  const std::string nearer = write("b.vdb", {volume::pointsToGrid(withStray(50), "points", 1)});
+  const std::string nearer = write("b.vdb", {volume::pointsToGrid(withStray(500), "points", 1)});
   EXPECT_LT(maxComponent(setUp(nearer).medium->bounds().extent()), 3.0);
   const FrameSetup kept = setUp(nearer, {"volume.0.strays=keep"});
-  EXPECT_GT(maxComponent(kept.medium->bounds().extent()), 50.0);
+  EXPECT_GT(maxComponent(kept.medium->bounds().extent()), 500.0);
   EXPECT_FALSE(notes(kept, "left out"));
   // Beside a grid, carriers out there are none either.
-  const std::string both = write("c.vdb", {volume::rasterize(withStray(50), {}).density,
-                                           volume::pointsToGrid(withStray(50), "points", 1)});
+  const std::string both = write("c.vdb", {volume::rasterize(withStray(500), {}).density,
+                                           volume::pointsToGrid(withStray(500), "points", 1)});
   const FrameSetup grid = setUp(both, {"estimator.carrier=particles"});
   EXPECT_LT(maxComponent(grid.medium->bounds().extent()), 3.0);
-  EXPECT_EQ(grid.particles.size(), withStray(50).size() - 1);
+  EXPECT_EQ(grid.particles.size(), withStray(500).size() - 1);
+}
+
+// A camera that looks at nothing else sees them.
+TEST_F(HardValues, StraysThatAloneAreInViewStay) {
+  const std::string file = write("a.vdb", {volume::pointsToGrid(withStray(500), "points", 1)});
+  const FrameSetup setup =
+      setUp(file, {"camera.position=[500, -500, 505]", "camera.look_at=[500, -500, 500]"});
+  EXPECT_GT(maxComponent(setup.medium->bounds().extent()), 499.0);
+  EXPECT_FALSE(notes(setup, "left out"));
 }
 
 // Floats would not tell the voxels of one from those of the next a million units away.

@@ -15,7 +15,7 @@
 namespace photosphere::volume {
 
 /// Particles or voxels that hold at most 0.5 % of the smoke, are at most 1 % of their kind, and lie
-/// farther than eight times the longest edge of the box around the rest from that box.
+/// farther than 64 times the longest edge of the box around the rest from that box.
 struct Strays {
   Box3d kept;               ///< holds all but them [scene units of the file]
   std::uint64_t count = 0;  ///< how many they are
@@ -30,7 +30,7 @@ struct Strays {
 };
 
 /// Strays of the active voxels of scalar grids of one file, each of which counts as much as the
-/// others; empty handles are passed over. Values that are negative or not finite weigh nothing.
+/// others; empty handles are passed over, and values that are not above 0 or not finite.
 /// @throws InputError for a grid that is not scalar, or not affine
 std::optional<Strays> findStrays(std::span<const Grid> grids);
 
@@ -38,7 +38,8 @@ std::optional<Strays> findStrays(std::span<const Grid> grids);
 /// finite are passed over.
 std::optional<Strays> findStrays(const ParticleSet& particles);
 
-/// A grid of any type without the active voxels outside a box of its own world space.
+/// A scalar or vector grid without the leaves and tiles whose middle lies outside a box of its own
+/// world space. @throws InputError for a grid of another kind, or not affine
 Grid clipped(const Grid& grid, const Box3d& box);
 
 }  // namespace photosphere::volume

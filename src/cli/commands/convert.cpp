@@ -129,6 +129,8 @@ std::function<int()> declareConvert(CLI::App& app) {
                  "Particle radius in scene units; 0 = pscale, else twice the median spacing [0]")
       ->check(CLI::NonNegativeNumber.description(""))
       ->type_name("R");
+  app.add_flag("--keep-strays", convert.keepStrays,
+               "Rasterize the few particles that lie far from all others, too");
   app.add_option("--voxel-size", convert.voxelSize,
                  "Voxel of the rasterized density in scene units; 0 = half the median radius [0]")
       ->check(CLI::NonNegativeNumber.description(""))
