@@ -71,7 +71,7 @@ struct FrameSetup {
   int batches = 1;
   std::uint64_t photons = 0;       ///< of one batch (and of each pass of it)
   std::uint64_t memoryBudget = 0;  ///< bytes that this frame may use; 0 = no limit
-  bool leftStrays = false;  ///< parts of volumes were left out as strays (volume.strays)
+  bool leftStrays = false;         ///< parts of volumes were left out as strays (volume.strays)
   double readSeconds = 0, rasterizeSeconds = 0;
   std::vector<std::string> notes;  ///< what the user should know
 };
