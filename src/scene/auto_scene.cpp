@@ -138,6 +138,8 @@ bool isPastMeasure(const transport::Medium& medium) {
   return static_cast<double>(medium.majorants().maximum()) * medium.voxelEdge() >
          0.5 * kMostVoxelDepth;
 }
+// Steps in which the density_scale of a probe goes down, and where they end: past any float's
+// range.
 constexpr double kThinner = 1e-6, kLeastProbe = 1e-80;
 
 // @param scaled  the density_scale that the medium has
@@ -254,14 +256,13 @@ SceneFile sceneForVolume(const std::filesystem::path& path, const std::vector<st
   };
   const SceneFile probe = probeAt(probed);
   FrameSetup smoke = setUpFrame(probe, frame);
-  while (!isSet(sets, "volume.0.density_scale") && isPastMeasure(*smoke.medium) &&
-         probed > kLeastProbe)
+  const bool scaleIsSet = isSet(sets, "volume.0.density_scale");
+  while (!scaleIsSet && isPastMeasure(*smoke.medium) && probed > kLeastProbe)
     smoke = setUpFrame(probeAt(probed *= kThinner), frame);
   if (smoke.worldBounds.empty())
     throw InputError(framePath(pattern, frame), fmt::format("grid '{}' holds no smoke", density));
-  const double scale = isSet(sets, "volume.0.density_scale")
-                           ? probe.volumes.front().values.vec3("density_scale").x
-                           : chooseScale(*smoke.medium, probed, choices);
+  const double scale = scaleIsSet ? probe.volumes.front().values.vec3("density_scale").x
+                                  : chooseScale(*smoke.medium, probed, choices);
   const Vec3d up = chooseUp(cache, smoke.worldBounds, choices);
   const Mat4d camera = frameBox(smoke.worldBounds, smoke.worldBounds.center(), up, kFov,
                                 Vec2i(probe.camera.vec2("resolution")));

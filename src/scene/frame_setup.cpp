@@ -312,9 +312,10 @@ FrameSetup setUpFrame(const SceneFile& written, std::int64_t frame, const SetupO
   const bool onlyStraysSeen = setup.leftStrays && isOutOfView(scene, setup);
   if (!onlyStraysSeen && !isOffCenter(setup)) return setup;
   const double read = setup.readSeconds, rasterize = setup.rasterizeSeconds;
+  // What was left out as unseen lay far from the rest.
   std::optional<Vec3d> center;
-  if (!onlyStraysSeen) center = setup.worldBounds.center();  // what is unseen lay far from the rest
-  setup = {};                                                // there may be no room for both
+  if (!onlyStraysSeen) center = setup.worldBounds.center();
+  setup = {};  // there may be no room for two
   setup = setUpAbout(center, onlyStraysSeen ? withStrays(scene) : scene, frame, options);
   setup.readSeconds += read;
   setup.rasterizeSeconds += rasterize;

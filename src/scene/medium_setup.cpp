@@ -98,8 +98,6 @@ transport::VolumeMotion placeMotion(const VolumeSource& source, const lights::Lo
   return motion;
 }
 
-// Beyond kMostVoxelDepth distances between collisions would be lost in the rounding of positions,
-// and extinction in the range of a float.
 // Density scales that stay within a float's range times any density.
 constexpr double kPlainScale = 1e20;
 

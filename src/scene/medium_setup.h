@@ -9,7 +9,8 @@ namespace photosphere::scene {
 
 /// Optical depth of one voxel from where on more of it shows nowhere: the eye sees 1 % of such a
 /// voxel's edge deep, and of light that scatters without loss 1 / 10,000 passes. More is taken as
-/// that.
+/// that: distances between collisions would be lost in the rounding of positions, and extinction in
+/// the range of a float.
 inline constexpr double kMostVoxelDepth = 1e4;
 
 /// Fills `medium`, `particles`, `space` and `worldBounds`, in two passes: where the smoke is, then

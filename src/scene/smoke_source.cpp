@@ -196,12 +196,9 @@ Box3d VolumeSource::bounds() const {
   for (const Grid* grid : {&density, &emission}) {
     const Box3i active = *grid ? grid->activeBounds() : Box3i();
     if (active.empty()) continue;
-    const Mat4d m = worldFromIndex(*grid);
     // Interpolation reaches one voxel beyond the active ones.
-    for (int corner = 0; corner < 8; ++corner)
-      box.grow(transformPoint(m, Vec3d(corner & 1 ? active.max.x + 1 : active.min.x - 1,
-                                       corner & 2 ? active.max.y + 1 : active.min.y - 1,
-                                       corner & 4 ? active.max.z + 1 : active.min.z - 1)));
+    box.grow(
+        transformBox(worldFromIndex(*grid), {Vec3d(active.min) - 1.0, Vec3d(active.max) + 1.0}));
   }
   return box;
 }

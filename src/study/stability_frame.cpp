@@ -176,4 +176,13 @@ double blockError(const StabilityFrame& frame, const StabilityFrame& reference, 
   return std::sqrt(sum / static_cast<double>(a.size()));
 }
 
+double meanError(const StabilityFrame& frame, const StabilityFrame& reference, double scale) {
+  return blockError(frame, reference, std::max(frame.width, frame.height), scale);
+}
+
+double frameError(const StabilityFrame& frame, const StabilityFrame& reference, int block,
+                  double scale) {
+  return std::max(blockError(frame, reference, block, scale), meanError(frame, reference, scale));
+}
+
 }  // namespace photosphere::study

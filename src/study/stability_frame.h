@@ -43,6 +43,14 @@ StabilityFrame renderStabilityFrame(const StabilityFrameJob& job);
 double blockError(const StabilityFrame& frame, const StabilityFrame& reference, int block,
                   double scale);
 
+/// The same of the mean of each channel over the frame.
+double meanError(const StabilityFrame& frame, const StabilityFrame& reference, double scale);
+
+/// What a row is judged by: the larger of the two. Where one bright block is off, the others
+/// outvote it over blocks, and not in the mean.
+double frameError(const StabilityFrame& frame, const StabilityFrame& reference, int block,
+                  double scale);
+
 /// Mean over pixels and channels.
 double meanOf(const StabilityFrame& frame);
 

@@ -35,12 +35,12 @@ SmokeSpec SlabRadiance::smoke() const {
   return spec;
 }
 
-std::vector<std::string> SlabRadiance::settings(const Direction& d, int effort) const {
+std::vector<std::string> SlabRadiance::settings(const Direction& d, std::size_t effort) const {
   const double s = std::sqrt(std::max(0.0, 1 - d.mu * d.mu)), side = d.top ? 1 : -1;
   const double far = 4 * halfWidth(tau);
   // Across the plane in which the view is tilted, more of the slab is seen at the same distance
   // from its sides.
-  const bool faint = effort == kEfforts - 1;
+  const bool faint = effort == kDim.size();
   const int rows = faint ? 8 * std::max(1, static_cast<int>(halfWidth(tau) / (3 * kSeen))) : 8;
   std::vector<std::string> sets{
       "volume.0.density_scale=1", fmt::format("volume.0.albedo={}", albedo),

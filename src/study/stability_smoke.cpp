@@ -94,11 +94,8 @@ class Smoke {
       l.count = dims();
       return l;
     }
-    Box3d box;
-    const Mat4d inverse = glm::inverse(l.worldFromIndex);
-    for (int corner = 0; corner < 8; ++corner)
-      box.grow(transformPoint(
-          inverse, Box3d{m_center - 0.5 * m_size, m_center + 0.5 * m_size}.corner(corner)));
+    const Box3d box = transformBox(glm::inverse(l.worldFromIndex),
+                                   {m_center - 0.5 * m_size, m_center + 0.5 * m_size});
     l.first = Vec3i(glm::floor(box.min));
     l.count = Vec3i(glm::ceil(box.max)) - l.first + 1;
     return l;

@@ -175,15 +175,6 @@ double lightOf(estimators::LightSums sums) {
   return light;
 }
 
-void judgeRefusal(const StabilityCase& c, const ChildResult& child, StabilityRow& row) {
-  row.expected = fmt::format("exit {}", c.oracle.code);
-  row.result = fmt::format("exit {}", static_cast<int>(child.code));
-  row.message = child.message;
-  row.passed = child.failed && static_cast<int>(child.code) == c.oracle.code &&
-               child.message.find(c.oracle.message) != std::string::npos;
-  row.error = row.passed ? 0 : 1;
-}
-
 // Sums that hold so many times what some photons leave must go on to count these, to the last unit:
 // added as a shard, and one by one as deposits.
 std::string countWork(std::int64_t times, std::uint64_t photons) {
@@ -230,13 +221,25 @@ void runSums(const StabilityCase& c, StabilityRow& row) {
   const ChildResult plain = runInChild([&] { return light(1); });
   const ChildResult child = runInChild([&] { return light(excess); });
   row.seconds = child.seconds;
-  if (c.oracle.kind == "error") return judgeRefusal(c, child, row);
+  if (c.oracle.kind == "error")
+    return judgeRefusal(c, child.failed, child.code, child.message, row);
   row.message = child.failed ? child.message : plain.message;
   if (child.failed || plain.failed) return;
   judge(std::stod(plain.text) * excess, std::stod(child.text), row);
 }
 
 }  // namespace
+
+void judgeRefusal(const StabilityCase& c, bool failed, ExitCode code, const std::string& message,
+                  StabilityRow& row) {
+  row.expected = fmt::format("exit {}", c.oracle.code);
+  row.result = fmt::format("exit {}", static_cast<int>(code));
+  row.message = message;
+  row.passed = failed && static_cast<int>(code) == c.oracle.code &&
+               message.find(c.oracle.message) != std::string::npos;
+  row.error = row.passed ? 0 : 1;
+  if (!row.passed && failed) row.message += fmt::format(" (wanted: {})", c.oracle.message);
+}
 
 double semiInfiniteReflectance(double albedo, bool beam) {
   // Gauss-Legendre over [0, 1] in 64 points, by Newton's method on the Legendre polynomial.

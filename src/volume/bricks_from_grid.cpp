@@ -1,9 +1,8 @@
-#include <openvdb/openvdb.h>
-
 #include <fmt/format.h>
 
 #include <set>
 
+#include "openvdb_grid.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/resources.h"
 #include "photosphere/volume/bricks.h"
@@ -77,13 +76,8 @@ BrickField<T> build(const GridT& grid, const std::string& path, std::uint64_t bu
   std::set<Vec3i, CoordLess> touched;
   for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf)
     if (!leaf->isEmpty()) touch(touched, leaf->getNodeBoundingBox(), origin);
-  auto tile = grid.cbeginValueOn();
-  tile.setMaxDepth(GridT::TreeType::ValueOnCIter::LEAF_DEPTH - 1);
-  for (; tile; ++tile) {
-    openvdb::CoordBBox box;
-    tile.getBoundingBox(box);
-    touch(touched, box, origin);
-  }
+  forEachActiveTile(
+      grid, [&](const openvdb::CoordBBox& voxels, const auto&) { touch(touched, voxels, origin); });
   std::vector<Vec3i> candidates;
   for (const Vec3i& b : touched)
     if (b.x >= 0 && b.y >= 0 && b.z >= 0 && b.x < nx && b.y < ny && b.z < nz)

@@ -5,6 +5,7 @@
 #include <openvdb/openvdb.h>
 
 #include <string>
+#include <type_traits>
 
 #include "photosphere/volume/grid.h"
 
@@ -45,6 +46,24 @@ template <class Base, class F>
 bool visitVectorGrid(Base& grid, F&& f) {
   using Types = openvdb::TypeList<openvdb::Vec3SGrid, openvdb::Vec3DGrid, openvdb::Vec3IGrid>;
   return grid.template apply<Types>(f);
+}
+
+/// Calls `f(voxels, iterator)` for every active tile; its values may be changed where the grid is
+/// not const.
+template <class GridT, class F>
+void forEachActiveTile(GridT& grid, F&& f) {
+  auto tile = [&] {
+    if constexpr (std::is_const_v<GridT>)
+      return grid.cbeginValueOn();
+    else
+      return grid.beginValueOn();
+  }();
+  tile.setMaxDepth(std::remove_const_t<GridT>::TreeType::ValueOnCIter::LEAF_DEPTH - 1);
+  for (; tile; ++tile) {
+    openvdb::CoordBBox voxels;
+    tile.getBoundingBox(voxels);
+    f(voxels, tile);
+  }
 }
 
 /// `float grid "density"` for messages.

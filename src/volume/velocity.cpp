@@ -137,7 +137,7 @@ Grid velocityOfParticles(const ParticleSet& particles, const std::string& attrib
   // Masses are not negative: a velocity that all share is added first and taken away again.
   double shift = 0;
   for (std::size_t i = 0; i < particles.size(); ++i) {
-    if (!options.within.empty() && !options.within.contains(particles.positions[i])) continue;
+    if (!options.takes(particles.positions[i])) continue;
     for (int c = 0; c < 3; ++c)
       if (const double value = std::abs(v->number(i, c)); std::isfinite(value))
         shift = std::max(shift, value);

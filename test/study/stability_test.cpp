@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -65,6 +66,25 @@ TEST(Stability, ErrorsOfBlocks) {
   EXPECT_EQ(blockError(frameOf(8, 8, 0), frameOf(8, 8, 0), 8, 1), 0);
   EXPECT_EQ(blockError(frameOf(8, 8, 1e-30), frameOf(8, 8, 0), 8, 1),
             std::numeric_limits<double>::infinity());
+}
+
+// One block of eight holds nearly all the light.
+TEST(Stability, TheMeanIsJudgedBesideTheBlocks) {
+  StabilityFrame one = frameOf(32, 16, 0.01);
+  for (int y = 0; y < 8; ++y)
+    for (int i = 0; i < 3 * 8; ++i)
+      one.pixels[static_cast<std::size_t>(3 * 32 * y + i)] = 1;
+  StabilityFrame other = one;
+  for (double& v : other.pixels)
+    if (v == 1) v = 1.3;
+  EXPECT_NEAR(blockError(other, one, 8, 1), 0.3 / std::sqrt(8), 0.002);
+  EXPECT_NEAR(meanError(other, one, 1), 0.3 * 0.935 / std::sqrt(1.01), 0.002);
+  EXPECT_EQ(frameError(other, one, 8, 1), meanError(other, one, 1));
+  EXPECT_EQ(frameError(one, one, 8, 1), 0);
+  // And the other way about: what is missing here is there.
+  other = one;
+  std::swap_ranges(other.pixels.begin(), other.pixels.begin() + 24, other.pixels.end() - 24);
+  EXPECT_EQ(frameError(other, one, 8, 1), blockError(other, one, 8, 1));
 }
 
 TEST(Stability, SemiInfiniteReflectanceIsThatOfADeepSlab) {
@@ -132,7 +152,7 @@ TEST(Stability, RowsPassWhenTheAnswerIsThat) {
   EXPECT_FALSE(rows[2].passed);
 }
 
-// A frame that is too bright by a tenth in every block, and one that is black where it must not be.
+// A frame that is too bright by a tenth, and one that is black where it must not be.
 TEST(Stability, MeansFloorsAndBoundsOfTheirOwn) {
   const std::string one = "[[case]]\nhard = \"-\"\nestimators = [\"single\"]\n";
   const std::string brighter =

@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "photosphere/core/rng.h"
 #include "photosphere/volume/rasterize.h"
@@ -35,6 +36,10 @@ ParticleSet with(ParticleSet set, const Vec3d& stray, int times = 1) {
   return set;
 }
 
+std::optional<Strays> strayParticles(const ParticleSet& set) {
+  return rasterize(set, {.leaveOutStrays = true}).strays;
+}
+
 // Beside two leaves of ones, single voxels of `value`.
 Grid gridWith(const std::vector<Vec3i>& strays, float value = 1.0f, double edge = 0.5) {
   auto grid = openvdb::FloatGrid::create();
@@ -49,7 +54,7 @@ Grid gridWith(const std::vector<Vec3i>& strays, float value = 1.0f, double edge 
 TEST(Strays, OneParticleFarAwayIsFoundAtAnyDistance) {
   for (const double d : {100.0, 1e3, 1e6, 1e12, 1e30, 1e100})
     for (const Vec3d& way : {Vec3d(1, 0, 0), Vec3d(0, -1, 0), Vec3d(1, 1, -1)}) {
-      const auto strays = findStrays(with(cubeOf(1000), d * way));
+      const auto strays = strayParticles(with(cubeOf(1000), d * way));
       ASSERT_TRUE(strays) << d;
       EXPECT_EQ(strays->count, 1u);
       EXPECT_EQ(strays->all, 1001u);
@@ -63,20 +68,20 @@ TEST(Strays, OneParticleFarAwayIsFoundAtAnyDistance) {
 }
 
 TEST(Strays, WhatCountsIsNone) {
-  EXPECT_FALSE(findStrays(cubeOf(1000)));
-  EXPECT_FALSE(findStrays(with(cubeOf(1000), Vec3d(60, 0, 0)))) << "too near";
-  EXPECT_FALSE(findStrays(with(cubeOf(1000), Vec3d(1e3, 0, 0), 100))) << "a cloud of its own";
-  EXPECT_FALSE(findStrays(with(cubeOf(3), Vec3d(1e3, 0, 0)))) << "a quarter of all";
-  EXPECT_FALSE(findStrays(cubeOf(1)));
-  EXPECT_FALSE(findStrays(ParticleSet{}));
+  EXPECT_FALSE(strayParticles(cubeOf(1000)));
+  EXPECT_FALSE(strayParticles(with(cubeOf(1000), Vec3d(60, 0, 0)))) << "too near";
+  EXPECT_FALSE(strayParticles(with(cubeOf(1000), Vec3d(1e3, 0, 0), 100))) << "a cloud of its own";
+  EXPECT_FALSE(strayParticles(with(cubeOf(3), Vec3d(1e3, 0, 0)))) << "a quarter of all";
+  EXPECT_FALSE(strayParticles(cubeOf(1)));
+  EXPECT_FALSE(strayParticles(ParticleSet{}));
   ParticleSet heavy = with(cubeOf(1000), Vec3d(1e3, 0, 0));
   std::vector<float> mass(1001, 1.0f);
   mass.back() = 10.0f;
   heavy.add({"mass", 1, mass});
-  EXPECT_FALSE(findStrays(heavy)) << "1 % of the mass";
+  EXPECT_FALSE(strayParticles(heavy)) << "1 % of the mass";
   ParticleSet nothing = cubeOf(1000);
   nothing.add({"mass", 1, std::vector<float>(1000, 0.0f)});
-  EXPECT_FALSE(findStrays(nothing));
+  EXPECT_FALSE(strayParticles(nothing));
 }
 
 TEST(Strays, SeveralRoundAboutAndPositionsThatAreNone) {
@@ -86,7 +91,7 @@ TEST(Strays, SeveralRoundAboutAndPositionsThatAreNone) {
       set.positions.push_back(d * way);
   set.positions.emplace_back(std::numeric_limits<double>::quiet_NaN(), 0, 0);
   set.add({"pscale", 1, std::vector<float>(set.size(), 0.05f)});
-  const auto strays = findStrays(set);
+  const auto strays = strayParticles(set);
   ASSERT_TRUE(strays);
   EXPECT_EQ(strays->count, 6u);
   EXPECT_NEAR(strays->farthest, 1e9, 10);

@@ -75,6 +75,13 @@ using Box3i = Box<Vec3i>;
 inline Vec3d transformPoint(const Mat4d& m, const Vec3d& p) {
   return Vec3d(m * glm::dvec4(p, 1.0));
 }
+/// The box around what an affine matrix makes of a box that is not empty.
+inline Box3d transformBox(const Mat4d& m, const Box3d& box) {
+  Box3d out;
+  for (int corner = 0; corner < 8; ++corner)
+    out.grow(transformPoint(m, box.corner(corner)));
+  return out;
+}
 /// Applies the linear part of an affine matrix to a direction or displacement.
 inline Vec3d transformVector(const Mat4d& m, const Vec3d& v) {
   return Mat3d(m) * v;

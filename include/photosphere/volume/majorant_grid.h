@@ -197,11 +197,8 @@ Box3d supportBounds(const BrickField<T>& field, const Mat4d& localFromNode) {
     nodes.grow(cell);
     nodes.grow(cell + edge);
   });
-  Box3d box;
-  if (nodes.empty()) return box;
-  for (int corner = 0; corner < 8; ++corner)
-    box.grow(transformPoint(localFromNode, Vec3d(nodes.corner(corner))));
-  return box;
+  if (nodes.empty()) return {};
+  return transformBox(localFromNode, {Vec3d(nodes.min), Vec3d(nodes.max)});
 }
 
 /// Shortest spacing of nodes along the three axes [m].

@@ -20,6 +20,8 @@ struct RasterizeOptions {
   double radius = 0;
   bool leaveOutStrays = false;  ///< see Strays
   Box3d within = {};            ///< particles outside are left out; empty = none [scene units]
+
+  bool takes(const Vec3d& position) const { return within.empty() || within.contains(position); }
 };
 
 struct RasterizeResult {

@@ -7,15 +7,16 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 
 #include "photosphere/core/types.h"
 #include "photosphere/volume/grid.h"
-#include "photosphere/volume/particle_set.h"
 
 namespace photosphere::volume {
 
-/// Particles or voxels that hold at most 0.5 % of the smoke, are at most 1 % of their kind, and lie
-/// farther than 64 times the longest edge of the box around the rest from that box.
+/// Particles (by their mass: RasterizeOptions::leaveOutStrays) or voxels (by their value) that hold
+/// at most 0.5 % of the smoke, are at most 1 % of their kind, and lie farther than 64 times the
+/// longest edge of the box around the rest from that box.
 struct Strays {
   Box3d kept;               ///< holds all but them [scene units of the file]
   std::uint64_t count = 0;  ///< how many they are
@@ -33,10 +34,6 @@ struct Strays {
 /// others; empty handles are passed over, and values that are not above 0 or not finite.
 /// @throws InputError for a grid that is not scalar, or not affine
 std::optional<Strays> findStrays(std::span<const Grid> grids);
-
-/// Strays of particles by their mass (rasterize's rule); those with a position or mass that is not
-/// finite are passed over.
-std::optional<Strays> findStrays(const ParticleSet& particles);
 
 /// A scalar or vector grid without the leaves and tiles whose middle lies outside a box of its own
 /// world space. @throws InputError for a grid of another kind, or not affine
