@@ -14,6 +14,7 @@ namespace photosphere::caches {
 namespace {
 
 constexpr std::size_t kMaxStride = std::size_t(1) << 20;
+constexpr std::int32_t kMaxChannels = 1024;
 constexpr auto kLittle = ByteOrder::little;
 constexpr Scalar kTypes[] = {Scalar::i16, Scalar::i32, Scalar::i64, Scalar::f16,
                              Scalar::f32, Scalar::f64, Scalar::u16, Scalar::u32,
@@ -111,9 +112,19 @@ void readChannels(FileReader& file, RecordLayout& layout) {
                      fmt::format("says {} channels of {} bytes: the header is damaged; "
                                  "write it again",
                                  channels, length));
+  if (channels > kMaxChannels)
+    throw InputError(file.path(), fmt::format("says {} channels, {} are the most: the header is "
+                                              "damaged; write it again",
+                                              channels, kMaxChannels));
   std::set<std::string> names;
+  std::size_t components = 0;
   for (std::int32_t i = 0; i < channels; ++i) {
     Channel channel = readChannel(file, static_cast<std::size_t>(length), layout);
+    // Records of different bytes have no more components than bytes.
+    if (components += channel.components.size(); components > kMaxStride)
+      throw InputError(file.path(), fmt::format("channel '{}' is the first of more than {} bytes a "
+                                                "particle: the header is damaged; write it again",
+                                                channel.name, kMaxStride));
     while (!names.insert(channel.name).second)
       channel.name += '_';
     layout.channels.push_back(std::move(channel));

@@ -28,7 +28,7 @@ bool takeNumber(std::string_view& rest, std::int64_t& value) {
   const auto [end, error] = std::from_chars(rest.data(), rest.data() + rest.size(), value);
   if (error != std::errc()) return false;
   rest.remove_prefix(static_cast<std::size_t>(end - rest.data()));
-  return std::abs(value) <= 1'000'000'000;
+  return value >= -1'000'000'000 && value <= 1'000'000'000;
 }
 
 struct Token {

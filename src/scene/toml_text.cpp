@@ -58,8 +58,52 @@ std::size_t lineOfAssertion(std::string_view text) {
   return static_cast<std::size_t>(at - ends.begin()) + 1;
 }
 
+// Parts of a dotted key: the parser counts how deep values nest, not keys, and tables are freed by
+// recursion.
+constexpr std::size_t kMostParts = 32;
+
+// Where the string that opens at `i` ends: its last quote, or before the end of its line.
+std::size_t endOfString(std::string_view text, std::size_t i) {
+  const char quote = text[i];
+  const std::string triple(3, quote);
+  const bool multiline = text.substr(i, 3) == triple;
+  for (i += multiline ? 3 : 1; i < text.size(); ++i) {
+    if (text[i] == '\\' && quote == '"')
+      ++i;
+    else if (multiline && text.substr(i, 3) == triple)
+      return i + 2;
+    else if (!multiline && text[i] == quote)
+      return i;
+    else if (!multiline && text[i] == '\n')
+      return i - 1;
+  }
+  return text.size();
+}
+
+// @throws ConfigError
+void refuseLongKeys(std::string_view text, const std::string& name) {
+  std::size_t dots = 0, line = 1;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    if (c == '"' || c == '\'') {
+      const std::size_t end = std::min(endOfString(text, i), text.size() - 1);
+      for (; i < end; ++i)
+        line += text[i] == '\n';
+    } else if (c == '#') {
+      i = std::min(text.find('\n', i), text.size()) - 1;
+    } else if (c == '.') {
+      if (++dots == kMostParts)
+        notToml(name, line, 1, fmt::format("a key of more than {} parts", kMostParts));
+    } else if (std::string_view("\n,=[]{}").find(c) != std::string_view::npos) {
+      dots = 0;
+      line += c == '\n';
+    }
+  }
+}
+
 // @throws ConfigError
 toml::table parseChecked(const std::string& text, const std::string& name) {
+  refuseLongKeys(text, name);
   try {
     return toml::parse(text, name);
   } catch (const toml::parse_error& error) {
@@ -144,6 +188,9 @@ void applySet(toml::table& root, const std::string& set, TomlText& out) {
   if (equals == std::string::npos || path.empty())
     throw ConfigError(fmt::format("--set {}: must be dotted.path=value", set));
   const std::vector<std::string> parts = segments(path);
+  if (parts.size() > kMostParts)
+    throw ConfigError(
+        fmt::format("--set: a path of {} parts, {} are the most", parts.size(), kMostParts));
   toml::node* at = &root;
   for (std::size_t i = 0; i + 1 < parts.size(); ++i)
     at = &descend(*at, parts[i], parts[i + 1], set);

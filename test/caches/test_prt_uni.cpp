@@ -66,6 +66,39 @@ CacheContent twoParticles() {
   return content;
 }
 
+// A list of channels that claims more bytes of each particle than a record can have: few bytes of
+// the file would become gigabytes of components, or a name looked up a million times.
+TEST(Prt, ChannelsMustFitIntoARecord) {
+  const TemporaryFolder folder;
+  const auto path = folder / "two.prt";
+  const CacheFormat& prt = formatForWriting("two.prt");
+  prt.write(path, twoParticles(), ParamValues(prt.params));
+  const std::string whole = test::readText(path);
+  const std::string header = whole.substr(0, at<std::uint32_t>(whole, 8));
+  const auto number = [](std::int32_t value) {
+    std::string bytes(sizeof value, '\0');
+    std::memcpy(bytes.data(), &value, sizeof value);
+    return bytes;
+  };
+  const auto refusal = [&](std::int32_t channels, std::int32_t arity) {
+    std::string text = header + number(4) + number(channels) + number(44);
+    for (std::int32_t i = 0; i < channels; ++i) {
+      std::string name = "Same";
+      name.resize(32, '\0');
+      text += name + number(9) + number(arity) + number(0);  // int8 at byte 0
+    }
+    test::writeText(path, text);
+    try {
+      readCache(path);
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string("read");
+  };
+  EXPECT_NE(refusal(64, 1 << 20).find("bytes a particle"), std::string::npos);
+  EXPECT_NE(refusal(30000, 1).find("30000 channels"), std::string::npos);
+}
+
 /// Follows the published layout by hand, with no code of the reader's.
 TEST(Prt, WritesTheDocumentedLayout) {
   TemporaryFolder folder;

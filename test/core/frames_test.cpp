@@ -23,7 +23,8 @@ TEST(Frames, ReadsEveryForm) {
 }
 
 TEST(Frames, RefusesEverythingElse) {
-  for (const char* text : {"", "a", "1-", "1-5x0", "1-5x", "1:5", "1-5z2", "1,,2", "1-99999999999"})
+  for (const char* text : {"", "a", "1-", "1-5x0", "1-5x", "1:5", "1-5z2", "1,,2", "1-99999999999",
+                           "-9223372036854775808", "-9223372036854775808-5"})
     EXPECT_THROW(parseFrames(text), ConfigError) << text;
 }
 
