@@ -106,21 +106,18 @@ void readChannels(FileReader& file, RecordLayout& layout) {
   file.number<std::int32_t>(kLittle, "the channel list");  // always 4
   const auto channels = file.number<std::int32_t>(kLittle, "the channel list");
   const auto length = file.number<std::int32_t>(kLittle, "the channel list");
-  if (channels < 1 || length < static_cast<std::int32_t>(kPrtChannelRecord) || length > 4096 ||
+  if (channels < 1 || channels > kMaxChannels ||
+      length < static_cast<std::int32_t>(kPrtChannelRecord) || length > 4096 ||
       static_cast<std::uint64_t>(channels) > file.remaining() / static_cast<std::uint64_t>(length))
     throw InputError(file.path(),
                      fmt::format("says {} channels of {} bytes: the header is damaged; "
                                  "write it again",
                                  channels, length));
-  if (channels > kMaxChannels)
-    throw InputError(file.path(), fmt::format("says {} channels, {} are the most: the header is "
-                                              "damaged; write it again",
-                                              channels, kMaxChannels));
   std::set<std::string> names;
   std::size_t components = 0;
   for (std::int32_t i = 0; i < channels; ++i) {
     Channel channel = readChannel(file, static_cast<std::size_t>(length), layout);
-    // Records of different bytes have no more components than bytes.
+    // Channels that share no byte have no more components than a particle has bytes.
     if (components += channel.components.size(); components > kMaxStride)
       throw InputError(file.path(), fmt::format("channel '{}' is the first of more than {} bytes a "
                                                 "particle: the header is damaged; write it again",

@@ -75,11 +75,6 @@ double way(const Camera& camera, const Vec2d& a, const Vec2d& b) {
   return glm::length(d);
 }
 
-Vec3d corner(const Box3d& box, int i) {
-  return {i & 1 ? box.max.x : box.min.x, i & 2 ? box.max.y : box.min.y,
-          i & 4 ? box.max.z : box.min.z};
-}
-
 // Points of the box that the camera sees: where rays enter and leave it, and its corners.
 std::vector<Vec3d> seenPoints(const Camera& camera, const Box3d& box) {
   const Vec2d size(camera.resolution());
@@ -91,7 +86,7 @@ std::vector<Vec3d> seenPoints(const Camera& camera, const Box3d& box) {
   };
   add(box.center());
   for (int i = 0; i < 8; ++i)
-    add(corner(box, i));
+    add(box.corner(i));
   const double nearest = 0.01 * radiusOf(box);  // at the eye itself everything blurs
   for (int i = 0; i < kLattice * kLattice; ++i) {
     const Vec2d raster = size * Vec2d(i % kLattice, i / kLattice) / (kLattice - 1.0);
@@ -198,8 +193,7 @@ double MovingCamera::parallax(const Box3d& box) const {
       continue;
     }
     for (int i = 0; i < 8 && !box.empty(); ++i)
-      widest =
-          std::max(widest, angleBetween(middle.eye - corner(box, i), now.eye - corner(box, i)));
+      widest = std::max(widest, angleBetween(middle.eye - box.corner(i), now.eye - box.corner(i)));
   }
   return widest;
 }

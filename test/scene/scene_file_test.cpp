@@ -233,23 +233,14 @@ TEST(SceneFileTest, SetsOverrideAndCreate) {
 
 // Tables nested without end would overflow the stack when they are freed.
 TEST(SceneFileTest, KeysOfTooManyPartsAreRefused) {
-  const auto error = [](const std::string& text, const std::vector<std::string>& sets = {}) {
-    try {
-      parseScene(text, "s.toml", ".", sets);
-    } catch (const ConfigError& refused) {
-      return std::string(refused.what());
-    }
-    return std::string();
-  };
   std::string path = "a";
   for (int i = 0; i < 200000; ++i)
     path += ".a";
   const std::string before = "# ' \"\n[user]\nt = \"\"\"\n''\n\"\"\"\n";
   for (const std::string& text : {"[" + path + "]\n", path + " = 1\n", "x = {" + path + " = 1}\n"})
-    EXPECT_NE(error(before + text).find("s.toml:6:1: not valid TOML: a key of more than 32 parts"),
-              std::string::npos)
-        << error(before + text).substr(0, 200);
-  EXPECT_NE(error("", {path + "=1"}).find("200001 parts"), std::string::npos);
+    EXPECT_TRUE(contains(complaint([&] { parse(before + text); }),
+                         ":6:1: not valid TOML: a key of more than 32 parts"));
+  EXPECT_TRUE(contains(complaint([&] { parse("", {path + "=1"}); }), "200001 parts"));
   // Dots of comments, texts and numbers are none of keys.
   std::string numbers = "0.5";
   for (int i = 0; i < 100; ++i)
@@ -258,7 +249,7 @@ TEST(SceneFileTest, KeysOfTooManyPartsAreRefused) {
   for (const std::string& text :
        {"# " + dots + "\n", "x = \"\\\"" + dots + "\"\n", "x = '" + dots + "'\n",
         "x = \"\"\"\n\"" + dots + "\"\"\"\n", "x = [" + numbers + "]\n"})
-    EXPECT_EQ(error(text).find("parts"), std::string::npos) << text;
+    EXPECT_FALSE(contains(complaint([&] { parse(text); }), "parts")) << text;
 }
 
 TEST(SceneFileTest, FrameRatesMayBeRatios) {

@@ -67,6 +67,16 @@ TEST(Strays, OneParticleFarAwayIsFoundAtAnyDistance) {
     }
 }
 
+// Whatever else is cut to the box, a velocity say, must reach as far as what stays.
+TEST(Strays, WhatStaysIsKeptWithItsRadius) {
+  ParticleSet set = with(with(cubeOf(1000), Vec3d(-10, 0, 0)), Vec3d(1e6, 0, 0));
+  set.add({"pscale", 1, std::vector<float>(set.size(), 0.5f)});
+  const auto strays = strayParticles(set);
+  ASSERT_TRUE(strays);
+  EXPECT_EQ(strays->count, 1u);
+  EXPECT_LE(strays->kept.min.x, -10.5);
+}
+
 TEST(Strays, WhatCountsIsNone) {
   EXPECT_FALSE(strayParticles(cubeOf(1000)));
   EXPECT_FALSE(strayParticles(with(cubeOf(1000), Vec3d(60, 0, 0)))) << "too near";
