@@ -124,7 +124,8 @@ std::vector<ChanKey> readChan(const std::string& path) {
     throw InputMissingError(path, "is a folder, not a .chan file");
   std::ifstream in(path, std::ios::binary);
   const std::uintmax_t size = std::filesystem::file_size(path, error);
-  if (!in || error) throw InputMissingError(path, "cannot be opened");
+  if (!in || error)
+    throw InputMissingError(path, "cannot open this file; check its name and permissions");
   if (size > kLargestFile)
     throw InputError(
         path, fmt::format("is {} bytes long; a .chan file has at most {}", size, kLargestFile));

@@ -270,8 +270,10 @@ SceneFile sceneForVolume(const std::filesystem::path& path, const std::vector<st
   text += volumeText(pattern, density, scale);
   if (!isSet(sets, "light"))
     text += keyLight(smoke.worldBounds, up, camera, smoke.space.metersPerUnit, choices);
-  choices.push_back(fmt::format("albedo = {}, g = {}: bright smoke that scatters forward.", kAlbedo,
-                                kAnisotropy));
+  if (!isSet(sets, "volume.0.albedo"))
+    choices.push_back(fmt::format("albedo = {}: bright smoke.", kAlbedo));
+  if (!isAnySet(sets, {"volume.0.phase", "volume.0.phase.g"}))
+    choices.push_back(fmt::format("g = {}: smoke that scatters forward.", kAnisotropy));
   SceneFile scene = parseScene(text, pattern, folder, sets);
   scene.choices = std::move(choices);
   scene.allowInvalid = allowInvalid;

@@ -185,7 +185,8 @@ SceneFile loadScene(const std::filesystem::path& path, const std::vector<std::st
   std::ostringstream text;
   if (std::filesystem::is_directory(path))
     throw InputMissingError(path.string(), "is a folder, not a scene file");
-  if (!in) throw InputMissingError(path.string(), "cannot be opened");
+  if (!in)
+    throw InputMissingError(path.string(), "cannot open this file; check its name and permissions");
   if (in.peek() != std::ifstream::traits_type::eof()) text << in.rdbuf();
   if (!in.good() && !in.eof()) throw InputMissingError(path.string(), "cannot be read");
   const std::filesystem::path folder = std::filesystem::absolute(path).parent_path();

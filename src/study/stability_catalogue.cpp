@@ -177,7 +177,8 @@ std::vector<std::string> itemsOf(const toml::table& table) {
 
 std::string readText(const fs::path& path) {
   std::ifstream in(path);
-  if (!in) throw InputMissingError(path.string(), "cannot be opened");
+  if (!in)
+    throw InputMissingError(path.string(), "cannot open this file; check its name and permissions");
   std::stringstream text;
   text << in.rdbuf();
   return text.str();

@@ -2,6 +2,7 @@
 
 #include "photosphere/scene/pipeline.h"
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "fixture.h"
@@ -499,6 +500,16 @@ TEST_F(PipelineTest, ABareVolumeTakesAnotherCameraOrLight) {
   ASSERT_EQ(lit.lights.size(), 1u);
   for (const std::string& choice : lit.choices)
     EXPECT_FALSE(contains(choice, "Key light")) << choice;
+  // What is set was not chosen.
+  const auto chosen = [&](const std::string& set, const std::string& what) {
+    const SceneFile scene = sceneForVolume(path, {set});
+    return std::any_of(scene.choices.begin(), scene.choices.end(),
+                       [&](const std::string& choice) { return contains(choice, what); });
+  };
+  EXPECT_TRUE(chosen("scene.fps=24", "albedo = 0.9"));
+  EXPECT_FALSE(chosen("volume.0.albedo=0.5", "albedo = "));
+  EXPECT_TRUE(chosen("volume.0.albedo=0.5", "g = 0.4"));
+  EXPECT_FALSE(chosen("volume.0.phase.g=0.1", "g = "));
 }
 
 TEST_F(PipelineTest, ABareVolumeInCentimetresIsLitAlike) {

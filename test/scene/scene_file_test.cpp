@@ -316,6 +316,11 @@ TEST(SceneFileTest, TheHashFollowsPixelsAndNotPlaces) {
     EXPECT_NE(parse(kBase, {set}).hash(), hash) << set;
 }
 
+TEST(SceneFileTest, AMissingFileIsNamedWithTheRemedy) {
+  EXPECT_TRUE(contains(complaint([] { loadScene("nothere.toml"); }, ExitCode::inputMissing),
+                       "nothere.toml: cannot open this file; check its name"));
+}
+
 TEST(SceneFileTest, PathsAreRelativeToTheFile) {
   const TemporaryFolder folder;
   std::filesystem::create_directory(folder / "shots");
