@@ -133,6 +133,11 @@ void readTextRow(FileReader& file, const PlyElement& element, unsigned char* rec
         throw InputError(file.path(), fmt::format("line {}: list '{}' is shorter than it says",
                                                   file.lineNumber(), property.name));
   }
+  if (!nextWord(line).empty())
+    throw InputError(file.path(),
+                     fmt::format("line {}: more values than element '{}' has: the file "
+                                 "is damaged; write it again",
+                                 file.lineNumber(), element.name));
 }
 
 void readBinaryRow(FileReader& file, const PlyElement& element, ByteOrder order,
@@ -156,6 +161,19 @@ void checkCount(const FileReader& file, const PlyElement& element, bool ascii) {
         fmt::format("says {} of element '{}', but has room for at most {}: the file is "
                     "truncated or its header is wrong; write it again",
                     element.count, element.name, fits));
+}
+
+void checkEnd(FileReader& file, const PlyHeader& header) {
+  const std::uint64_t rest = file.remaining();
+  char blanks[256] = {};
+  bool blank = header.ascii || rest <= 2;  // some writers end binary data with a line end
+  for (std::size_t got = 0; blank && (got = file.readSome(blanks, sizeof blanks)) > 0;)
+    blank = std::string_view(blanks, got).find_first_not_of(" \t\r\n") == std::string_view::npos;
+  if (!blank)
+    throw InputError(file.path(),
+                     fmt::format("holds {} bytes after the last of its {} elements: its header or "
+                                 "its data is damaged; write it again",
+                                 rest, header.elements.size()));
 }
 
 void skipElement(FileReader& file, const PlyElement& element, const PlyHeader& header) {

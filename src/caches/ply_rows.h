@@ -17,7 +17,11 @@ void readTextRow(FileReader& file, const PlyElement& element, unsigned char* rec
 void readBinaryRow(FileReader& file, const PlyElement& element, ByteOrder order,
                    unsigned char* record);
 
-/// Passes over an element that stands before the vertices. @throws InputError
+/// Passes over an element that is not wanted. @throws InputError
 void skipElement(FileReader& file, const PlyElement& element, const PlyHeader& header);
+
+/// After the last element only blanks may come: a count that a damaged header lowers, or a list
+/// that is shorter than it was, leaves more. @throws InputError
+void checkEnd(FileReader& file, const PlyHeader& header);
 
 }  // namespace photosphere::caches

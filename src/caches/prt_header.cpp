@@ -147,6 +147,10 @@ PrtHeader readPrtHeader(FileReader& file, CacheContent& content) {
                      fmt::format("is no PRT of version 1 or 2 (says {}); save it again as "
                                  ".prt, .ply or .csv",
                                  version));
+  if (header.count < kPrtUnfinished)
+    throw InputError(file.path(), fmt::format("says {} particles: the header is damaged; write it "
+                                              "again",
+                                              header.count));
   if (length < static_cast<std::int32_t>(kPrtFixedHeader) ||
       static_cast<std::uint64_t>(length) - kPrtFixedHeader > file.remaining())
     throw InputError(file.path(), fmt::format("says a header of {} bytes; write it again", length));

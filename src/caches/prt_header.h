@@ -14,9 +14,10 @@ inline constexpr std::string_view kPrtMagic{"\xC0PRT\r\n\x1A\n", 8};
 inline constexpr std::size_t kPrtFixedHeader = 56;
 inline constexpr std::size_t kPrtChannelRecord = 44;
 inline constexpr std::size_t kPrtChannelName = 32;
+inline constexpr std::int64_t kPrtUnfinished = -1;
 
 struct PrtHeader {
-  std::int64_t count = 0;  ///< -1: the writer did not come to the end
+  std::int64_t count = 0;  ///< kPrtUnfinished: the writer did not come to the end
   RecordLayout layout;
 };
 

@@ -81,12 +81,12 @@ class TableReader {
     if (!firstLine(first)) fail("has no row of numbers; export it again");
     m_delimiter = sniffDelimiter(first);
     std::vector<std::string> cells = splitCells(first, m_delimiter);
-    if (m_pts && cells.size() == 1 && parseInteger(cells[0], m_expected.emplace())) {
-      if (!firstLine(first) && *m_expected > 0) fail("has a count and no points");
+    std::uint64_t count = 0;
+    if (m_pts && cells.size() == 1 && parseInteger(cells[0], count)) {
+      expect(count);
+      if (!firstLine(first) && count > 0) fail("has a count and no points");
       m_delimiter = sniffDelimiter(first);
       cells = splitCells(first, m_delimiter);
-    } else {
-      m_expected.reset();
     }
     if (cells.size() > kMaxColumns) fail("has more than 4096 columns");
     const bool header = std::none_of(cells.begin(), cells.end(), isNumber);
@@ -197,11 +197,22 @@ class TableReader {
                                  ", ")));
   }
 
+  /// Adds a count to the points that are to come. @throws InputError for more than there is room
+  /// for
+  void expect(std::uint64_t points) {
+    if (points <= m_file.size()) m_expected = m_expected.value_or(0) + points;
+    if (points > m_file.size() || *m_expected > m_file.size())
+      failLine(
+          fmt::format("says {} points, which {} bytes cannot hold: the file is truncated or "
+                      "damaged; write it again",
+                      points, m_file.size()));
+  }
+
   /// PTS files hold several scans, each with its own count.
   bool isBlockCount(std::string_view line) {
     std::uint64_t count = 0;
     if (!m_expected || m_names.size() < 3 || !parseInteger(trimmed(line), count)) return false;
-    *m_expected += count;
+    expect(count);
     return true;
   }
 
@@ -229,8 +240,9 @@ class TableReader {
   }
 
   volume::ParticleSet finish() {
-    if (m_expected && m_rows < *m_expected)
-      fail(fmt::format("says {} points and holds {}: the file is truncated", *m_expected, m_rows));
+    if (m_expected && m_rows != *m_expected)
+      fail(fmt::format("says {} points and holds {}: the file is {}; write it again", *m_expected,
+                       m_rows, m_rows < *m_expected ? "truncated" : "damaged"));
     volume::ParticleSet set;
     std::uint64_t empty = 0;
     for (TableColumn& column : m_columns) {

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "photosphere/core/frames.h"
+#include "photosphere/core/log.h"
 #include "photosphere/core/output_file.h"
 
 namespace photosphere::cli {
@@ -41,6 +42,11 @@ void StatsFile::keep(std::int64_t frame) {
   if (!m_earlier) {
     std::ifstream in(m_path);
     m_earlier = std::make_unique<Json>(Json::parse(in, nullptr, false));
+    if (in.is_open() && !m_earlier->is_array())
+      log::warning(
+          "{}: is no list of frames any more, so what it said of frames that are kept is lost; "
+          "render with --overwrite to have it again",
+          m_path);
   }
   if (!m_earlier->is_array()) return;
   for (const Json& object : *m_earlier)

@@ -12,6 +12,8 @@
 namespace photosphere::image {
 namespace {
 
+constexpr std::uint64_t kSmallTile = std::uint64_t{16} << 20;  // [bytes]
+
 /// Most bytes of pixels that one byte of such a file can stand for; a file that claims more is
 /// damaged. ZIP: deflate's 1032. PXR24 first drops a quarter of a float. RLE: 128 bytes in 2. PIZ:
 /// Huffman runs of 256 16-bit words in 10 bits. DWA: 64 pixels in one coefficient, then deflate.
@@ -51,6 +53,12 @@ void checkReadable(const std::string& path, const ExrScan& scan) {
   if (pixels * part.bytesPerPixel / largestRatio(part.compression) > scan.fileSize)
     throw InputError(path, fmt::format("claims {}x{} pixels, more than {} bytes can hold",
                                        part.data.width, part.data.height, scan.fileSize));
+  // OpenEXR makes room for whole tiles, however little of one the window shows.
+  if (part.pixelsPerTile * part.bytesPerPixel > kSmallTile && part.pixelsPerTile > 4 * pixels)
+    throw InputError(path,
+                     fmt::format("claims tiles of {} pixels for a picture of {}x{}: the header "
+                                 "is damaged; write it again",
+                                 part.pixelsPerTile, part.data.width, part.data.height));
   const std::uint64_t needed = pixels * 4 * static_cast<std::uint64_t>(part.channelCount);
   if (needed > availableMemoryBytes())
     throw MemoryError(fmt::format("{}: its pixels need {}, but {} of memory are free", path,

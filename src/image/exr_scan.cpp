@@ -155,6 +155,7 @@ void checkHeader(const ExrBytes& bytes, RawHeader& header, bool multiPart) {
         header.tiles.levelMode > 2)
       bytes.damaged("its tile sizes are missing or impossible");
     header.part.chunkCount = countTiles(header);
+    header.part.pixelsPerTile = std::uint64_t{header.tiles.width} * header.tiles.height;
   } else {
     const std::uint64_t lines = linesPerChunk(header.part.compression);
     header.part.chunkCount =

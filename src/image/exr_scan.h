@@ -22,6 +22,7 @@ struct ExrPart {
   bool subsampled = false;
   int channelCount = 0;
   std::uint64_t bytesPerPixel = 0;  ///< in the file, uncompressed
+  std::uint64_t pixelsPerTile = 0;  ///< of a whole tile; 0 for scan lines
   std::uint64_t chunkCount = 0;     ///< over all levels
 };
 

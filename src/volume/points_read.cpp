@@ -13,6 +13,7 @@
 #include "photosphere/core/error.h"
 #include "photosphere/core/log.h"
 #include "photosphere/core/parallel.h"
+#include "photosphere/core/resources.h"
 #include "photosphere/volume/vdb_file.h"
 #include "point_bins.h"
 
@@ -42,6 +43,7 @@ class PointReader {
 
   ParticleSet read() {
     ParticleSet result;
+    m_room = availableMemoryBytes();
     readPositions(result);
     if (!m_leaves.empty()) {
       const pts::AttributeSet& set = m_leaves.front().leaf->attributeSet();
@@ -86,6 +88,16 @@ class PointReader {
     return *found;
   }
 
+  /// Before memory is taken: a column of one value for all points takes none in the file.
+  void take(std::uint64_t bytesPerPoint) {
+    if (bytesPerPoint > 0 && m_size > m_room / bytesPerPoint)
+      throw MemoryError(
+          fmt::format("{}: its {} points need {} bytes each and more, but {} of memory "
+                      "are free; thin them out, or use a machine with more memory",
+                      m_name, m_size, bytesPerPoint, formatBytes(m_room)));
+    m_room -= bytesPerPoint * m_size;
+  }
+
   template <class Body>
   void forEachLeaf(const Body& body) const {
     parallelFor(m_leaves.size(), 16, [&](std::size_t begin, std::size_t end) {
@@ -94,7 +106,8 @@ class PointReader {
     });
   }
 
-  void readPositions(ParticleSet& result) const {
+  void readPositions(ParticleSet& result) {
+    take(sizeof(Vec3d));
     result.positions.resize(m_size);
     const openvdb::math::Transform& transform = m_grid->transform();
     forEachLeaf([&](const Leaf& leaf, std::size_t begin) {
@@ -112,11 +125,11 @@ class PointReader {
 
   // `Value` as OpenVDB stores it, in `Components` elements of the column.
   template <class Value, class Element, int Components>
-  void readValues(const std::string& name, const pts::AttributeArray& first,
-                  ParticleSet& result) const {
+  void readValues(const std::string& name, const pts::AttributeArray& first, ParticleSet& result) {
     const openvdb::Name type = first.valueType();
     const openvdb::Index stride = first.stride();
     const std::size_t arity = static_cast<std::size_t>(stride) * Components;
+    take(arity * sizeof(Element));
     std::vector<Element> column(arity * m_size);
     forEachLeaf([&](const Leaf& leaf, std::size_t begin) {
       const pts::AttributeHandle<Value> handle(array(leaf, name, type, stride));
@@ -138,9 +151,9 @@ class PointReader {
     result.attributes.push_back({name, static_cast<int>(arity), std::move(column)});
   }
 
-  void readStrings(const std::string& name, const pts::AttributeArray& first,
-                   ParticleSet& result) const {
+  void readStrings(const std::string& name, const pts::AttributeArray& first, ParticleSet& result) {
     const openvdb::Index stride = first.stride();
+    take(stride * sizeof(std::string));
     std::vector<std::string> column(stride * m_size);
     forEachLeaf([&](const Leaf& leaf, std::size_t begin) {
       const pts::StringAttributeHandle handle(array(leaf, name, first.valueType(), stride),
@@ -154,7 +167,7 @@ class PointReader {
   }
 
   void readAttribute(const std::string& name, const pts::AttributeArray& first,
-                     ParticleSet& result) const {
+                     ParticleSet& result) {
     const std::string type = first.valueType();
     if (pts::isGroup(first)) return;  // membership flags of an editor, nothing to render
     if (!first.hasConstantStride() || first.stride() == 0) {
@@ -187,6 +200,7 @@ class PointReader {
   std::shared_ptr<const pts::PointDataGrid> m_grid;
   std::vector<LeafRange> m_leaves;
   std::size_t m_size = 0;
+  std::uint64_t m_room = 0;  ///< memory that is not spoken for [bytes]
 };
 
 }  // namespace

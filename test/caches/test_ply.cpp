@@ -50,7 +50,7 @@ TEST(Ply, PassesOverListsAndOtherElements) {
       readText("ply\nformat ascii 1.0\n" + header + "3 1 2 3 9\n0 9\n2 7 7 1 2 3\n3 0 0 0\n");
   EXPECT_EQ(ascii.positions.at(0), Vec3d(1, 2, 3));
   std::string body("\x01\0\0\0\x05\0\x09\0\0\x09\x01\x40\0\0\0", 15);
-  body += std::string("\x3f\x80\0\0\x40\0\0\0\x40\x40\0\0", 12);
+  body += std::string("\x3f\x80\0\0\x40\0\0\0\x40\x40\0\0", 12) + '\0';
   const volume::ParticleSet big = readText("ply\nformat binary_big_endian 1.0\n" + header + body);
   EXPECT_EQ(big.positions.at(0), Vec3d(1, 2, 3));
 }
@@ -61,6 +61,28 @@ TEST(Ply, RefusesACountThatTheFileCannotHold) {
       "z\nend_header\n0 0 0\n";
   EXPECT_THROW(readText("ply\nformat ascii 1.0\n" + header), InputError);
   EXPECT_THROW(readText("ply\nformat binary_little_endian 1.0\n" + header), InputError);
+}
+
+TEST(Ply, RefusesMoreThanItsHeaderCounts) {
+  const std::string header =
+      "element vertex 1\nproperty char x\nproperty char y\nproperty char z\nelement edge "
+      "1\nproperty char a\nend_header\n";
+  const auto refusal = [&](const std::string& format, const std::string& data) -> std::string {
+    try {
+      readText("ply\nformat " + format + " 1.0\n" + header + data);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "read";
+  };
+  EXPECT_EQ(refusal("ascii", "1 2 3\n4\n \n\r\n"), "read");
+  EXPECT_EQ(refusal("binary_little_endian", "xyza"), "read");
+  EXPECT_EQ(refusal("binary_little_endian", "xyza\r\n"), "read");
+  EXPECT_NE(refusal("ascii", "1 2 3 4\n5\n").find("line 10"), std::string::npos);
+  EXPECT_NE(refusal("ascii", "1 2 3\n4\n5\n").find("2 bytes after the last"), std::string::npos);
+  EXPECT_NE(refusal("binary_big_endian", "xyzab").find("1 bytes after"), std::string::npos);
+  EXPECT_NE(refusal("binary_big_endian", "xyza   ").find("3 bytes after"), std::string::npos);
+  EXPECT_NE(refusal("ascii", "1 2 3\n").find("edge"), std::string::npos);
 }
 
 TEST(Ply, NamesTheLineOfABadNumber) {

@@ -148,6 +148,30 @@ TEST(Prt, ReadsAFileWhoseWriterDidNotFinish) {
   EXPECT_EQ(content.notes.size(), 1u);
 }
 
+// The checksum stands behind the last particle: a lower count would leave it unread.
+TEST(Prt, TheCountMustBeThatOfTheData) {
+  const TemporaryFolder folder;
+  const CacheFormat& prt = formatForWriting("a.prt");
+  prt.write(folder / "a.prt", twoParticles(), ParamValues(prt.params));
+  const std::string whole = test::readText(folder / "a.prt");
+  const auto refusal = [&](std::int64_t count) {
+    std::string bytes = whole;
+    std::memcpy(bytes.data() + 48, &count, sizeof count);
+    test::writeText(folder / "a.prt", bytes);
+    try {
+      readCache(folder / "a.prt");
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string("read");
+  };
+  EXPECT_EQ(refusal(2), "read");
+  EXPECT_NE(refusal(3).find("truncated"), std::string::npos);
+  EXPECT_NE(refusal(1).find("more than the 1 particles"), std::string::npos);
+  EXPECT_NE(refusal(0).find("more than the 0 particles"), std::string::npos);
+  EXPECT_NE(refusal(-2).find("says -2 particles"), std::string::npos);
+}
+
 /// Blender baked the same frames as .uni and as .vdb: the values must agree to half precision.
 TEST(Uni, HoldsWhatTheVdbOfTheSameFrameHolds) {
   FOREIGN_CACHE(folder, "blender");

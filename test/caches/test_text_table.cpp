@@ -98,6 +98,10 @@ TEST(TextTable, ErrorsNameTheLine) {
   EXPECT_NE(message("a.csv", "x;y;z\n1,5;2;3\n").find("decimal commas"), std::string::npos);
   EXPECT_NE(message("a.csv", "a,b\n1,2\n").find("columns"), std::string::npos);
   EXPECT_NE(message("a.pts", "5\n1 2 3\n1 2 3\n").find("truncated"), std::string::npos);
+  // More than the count is damage as well, and no count makes room that the file has not.
+  EXPECT_NE(message("a.pts", "1\n1 2 3\n1 2 3\n").find("damaged"), std::string::npos);
+  EXPECT_NE(message("a.pts", "18446744073709551615\n1 2 3\n").find("line 1"), std::string::npos);
+  EXPECT_NE(message("a.pts", "1\n1 2 3\n18446744073709551615\n").find("line 3"), std::string::npos);
   EXPECT_NE(message("a.csv", std::string("x,y,z\0", 6)).find("not text"), std::string::npos);
   EXPECT_NE(message("a.csv", std::string(3 << 20, 'x')).find("longer"), std::string::npos);
 }

@@ -1,8 +1,14 @@
 // Small sound files of everything that is read.
 
+#include <OpenEXR/ImfChannelList.h>
+#include <OpenEXR/ImfFrameBuffer.h>
+#include <OpenEXR/ImfHeader.h>
+#include <OpenEXR/ImfTiledOutputFile.h>
 #include <fmt/format.h>
 
 #include <cstring>
+
+#include "openimageio.h"
 
 #include "photosphere/caches/cache_format.h"
 #include "photosphere/core/checkpoint.h"
@@ -216,6 +222,61 @@ std::string exr(image::ExrCompression compression) {
   return test::readText(folder / "a.exr");
 }
 
+/// Three tiles across and two down, mip-mapped.
+std::string tiledExr() {
+  const TemporaryFolder folder;
+  const std::string path = (folder / "a.exr").string();
+  std::vector<float> pixels(20 * 12);
+  for (std::size_t i = 0; i < pixels.size(); ++i)
+    pixels[i] = 0.1f * static_cast<float>(i);
+  {
+    Imf::Header header(20, 12);
+    header.compression() = Imf::ZIP_COMPRESSION;
+    header.setTileDescription(Imf::TileDescription(8, 8, Imf::MIPMAP_LEVELS));
+    Imf::FrameBuffer buffer;
+    for (const char* name : {"R", "G", "B"}) {
+      header.channels().insert(name, Imf::Channel(Imf::FLOAT));
+      buffer.insert(name, Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(pixels.data()),
+                                     sizeof(float), 20 * sizeof(float)));
+    }
+    Imf::TiledOutputFile file(path.c_str(), header, 0);
+    file.setFrameBuffer(buffer);
+    for (int level = 0; level < file.numLevels(); ++level)
+      file.writeTiles(0, file.numXTiles(level) - 1, 0, file.numYTiles(level) - 1, level);
+  }
+  return test::readText(path);
+}
+
+/// 12 x 5 pixels by OpenImageIO.
+std::string picture(const char* format, const char* compression) {
+  std::vector<float> rgb(12 * 5 * 3);
+  for (std::size_t i = 0; i < rgb.size(); ++i)
+    rgb[i] = static_cast<float>(i % 37) / 36.0f;
+  std::string bytes;
+  image::openImageIo().encode({format, 12, 5, false, compression}, rgb.data(), bytes);
+  return bytes;
+}
+
+constexpr const char* kColorConfig = R"(ocio_profile_version: 2
+roles:
+  default: linear
+  scene_linear: linear
+displays:
+  screen:
+    - !<View> {name: plain, colorspace: curve}
+colorspaces:
+  - !<ColorSpace>
+    name: linear
+    encoding: scene-linear
+    bitdepth: 32f
+  - !<ColorSpace>
+    name: curve
+    from_scene_reference: !<GroupTransform>
+      children:
+        - !<MatrixTransform> {matrix: [2, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]}
+        - !<ExponentTransform> {value: 2.2, direction: inverse}
+)";
+
 /// Radiance picture of 8 x 4 pixels: a run and literals in every line.
 std::string radiance() {
   std::string out = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\nEXPOSURE=1\n\n-Y 4 +X 8\n";
@@ -239,7 +300,15 @@ void addPictures(std::vector<Specimen>& all) {
   for (const auto& [name, compression] : compressions)
     all.push_back({"exr", name, exr(compression)});
   all.push_back({"exr.scan", "rle", exr(ExrCompression::rle)});
+  for (const char* target : {"exr", "exr.scan"})
+    all.push_back({target, "tiled", tiledExr()});
   all.push_back({"hdr", "runs", radiance()});
+  for (const auto& [format, compression] :
+       {std::pair("png", ""), std::pair("jpeg", ""), std::pair("tiff", "zip"),
+        std::pair("tiff", "lzw"), std::pair("bmp", ""), std::pair("targa", "")})
+    all.push_back({"picture", std::string(format) + (*compression ? "_" : "") + compression,
+                   picture(format, compression)});
+  all.push_back({"ocio", "curve", kColorConfig});
 }
 
 /// A part of a checkpoint, of the work named `work`.

@@ -16,6 +16,7 @@
 #include "photosphere/core/frames.h"
 #include "photosphere/estimators/light_cache.h"
 #include "photosphere/estimators/light_shard.h"
+#include "photosphere/image/color.h"
 #include "photosphere/image/exr.h"
 #include "photosphere/image/load.h"
 #include "photosphere/scene/scene_file.h"
@@ -216,6 +217,9 @@ void readCheckpoint(const std::string& bytes, const fs::path& folder) {
   if (!in->atEnd()) in->fail();
 }
 
+/// OpenImageIO opens every picture with 64 MiB.
+constexpr std::size_t kPictureRoom = std::size_t{80} << 20;
+
 void addPictures(std::vector<Target>& all) {
   all.push_back({"exr.scan",
                  [](const std::string& bytes, const fs::path& folder) {
@@ -239,7 +243,25 @@ void addPictures(std::vector<Target>& all) {
                  },
                  false,
                  {"#?RADIANCE\n", "FORMAT=32-bit_rle_rgbe\n", "-Y ", "+X ", "EXPOSURE="},
-                 std::size_t{80} << 20});  // OpenImageIO opens every picture with 64 MiB
+                 kPictureRoom});
+  all.push_back({"picture",  // of any kind: its bytes decide, not its name
+                 [](const std::string& bytes, const fs::path& folder) {
+                   image::loadImage(place(folder, "x.picture", bytes));
+                 },
+                 false,
+                 {"IHDR", "IDAT", "\x89PNG\r\n\x1a\n", "II*", "MM", "\xFF\xD8\xFF"},
+                 kPictureRoom});
+  all.push_back({"ocio",
+                 [](const std::string& bytes, const fs::path& folder) {
+                   const auto config =
+                       image::ColorConfig::load(place(folder, "x.ocio", bytes).string());
+                   const auto spaces = config.colorSpaces();
+                   if (!spaces.empty()) config.converter(spaces.front(), spaces.back());
+                   config.displayConverter(spaces.empty() ? "" : spaces.front(), "", "");
+                 },
+                 false,
+                 {"ocio_profile_version: 2\n", "roles:\n", "displays:\n", "colorspaces:\n",
+                  "- !<ColorSpace>\n", "!<MatrixTransform>", "!<FileTransform>", "name: "}});
 }
 
 std::vector<std::string> sceneWords() {

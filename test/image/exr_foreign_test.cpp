@@ -11,6 +11,7 @@
 #include <OpenEXR/ImfTiledOutputFile.h>
 #include <gtest/gtest.h>
 
+#include <cstring>
 #include <vector>
 
 #include "photosphere/core/error.h"
@@ -84,6 +85,42 @@ INSTANTIATE_TEST_SUITE_P(Levels, ForeignTiles,
                                            std::pair(Imf::MIPMAP_LEVELS, Imf::ROUND_UP),
                                            std::pair(Imf::RIPMAP_LEVELS, Imf::ROUND_DOWN),
                                            std::pair(Imf::RIPMAP_LEVELS, Imf::ROUND_UP)));
+
+// OpenEXR makes room for whole tiles: 4 GiB for one pixel of 16 channels.
+TEST(ForeignExr, aTileThatThePictureCannotNeedIsRefused) {
+  const TemporaryFolder folder;
+  const auto refusal = [&](int tile) -> std::string {
+    Imf::Header tiled(1, 1);
+    tiled.compression() = Imf::NO_COMPRESSION;
+    tiled.setTileDescription(Imf::TileDescription(64, 64));
+    for (char c = 'A'; c < 'A' + 16; ++c)
+      tiled.channels().insert(std::string(1, c), Imf::Channel(Imf::FLOAT));
+    {
+      const float value = 1;
+      Imf::FrameBuffer buffer;
+      for (char c = 'A'; c < 'A' + 16; ++c)
+        buffer.insert(std::string(1, c),
+                      Imf::Slice::Make(Imf::FLOAT, &value, Imath::Box2i({0, 0}, {0, 0})));
+      Imf::TiledOutputFile file((folder / "a.exr").c_str(), tiled, 0);
+      file.setFrameBuffer(buffer);
+      file.writeTile(0, 0);
+    }
+    std::string bytes = test::readText(folder / "a.exr");
+    const std::size_t sizes = bytes.find("tiledesc") + 9 + 4;
+    for (const std::size_t place : {sizes, sizes + 4})
+      std::memcpy(bytes.data() + place, &tile, sizeof tile);
+    test::writeText(folder / "a.exr", bytes);
+    try {
+      readExr(folder / "a.exr");
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "read";
+  };
+  EXPECT_EQ(refusal(64), "read");
+  EXPECT_EQ(refusal(256), "read");
+  EXPECT_NE(refusal(8192).find("claims tiles of 67108864 pixels"), std::string::npos);
+}
 
 class ForeignCompressions : public ::testing::TestWithParam<Imf::Compression> {};
 

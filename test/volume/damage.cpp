@@ -1,5 +1,6 @@
 // What is said of a damaged file (test/fuzz damages each byte of one), and output whole or absent.
 #include <gtest/gtest.h>
+#include <openvdb/points/PointDataGrid.h>
 #include <signal.h>
 #include <sys/resource.h>
 
@@ -90,6 +91,29 @@ Grid bigGrid() {
   for (float& v : noise)
     v = static_cast<float>(state = state * 1664525u + 1013904223u);
   return denseToGrid("density", Vec3i(64), noise, Mat4d(1));
+}
+
+// A column of one value takes the same room in a file however many points it says that it is of.
+TEST(DamagedVdb, PointsThatNoMemoryHoldsAreRefusedBeforeTheyAreRead) {
+  namespace pts = openvdb::points;
+  openvdb::initialize();
+  auto grid = pts::PointDataGrid::create();
+  const auto descriptor = pts::AttributeSet::Descriptor::create(
+      pts::TypedAttributeArray<openvdb::Vec3f>::attributeType());
+  constexpr openvdb::Index kEach = 4'000'000'000;
+  for (int i = 0; i < 64; ++i) {  // 6 TB of positions
+    auto* leaf = grid->tree().touchLeaf(openvdb::Coord(8 * i, 0, 0));
+    leaf->initializeAttributes(descriptor, kEach);
+    std::vector<openvdb::PointDataIndex32> ends(pts::PointDataTree::LeafNodeType::SIZE, kEach);
+    leaf->setOffsets(ends);
+  }
+  try {
+    gridToPoints(Grid(grid));
+    FAIL() << "read";
+  } catch (const MemoryError& error) {
+    EXPECT_NE(std::string(error.what()).find("256000000000 points"), std::string::npos)
+        << error.what();
+  }
 }
 
 TEST(VdbOutput, AFullDeviceIsAnError) {

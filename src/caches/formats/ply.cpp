@@ -86,6 +86,9 @@ CacheContent read(const std::filesystem::path& path, const ParamValues&) {
   const PlyElement& points = header.elements[static_cast<std::size_t>(vertex)];
   content.particles.push_back(readVertices(file, points, header));
   content.particleNames.push_back("points");
+  for (std::size_t i = static_cast<std::size_t>(vertex) + 1; i < header.elements.size(); ++i)
+    skipElement(file, header.elements[i], header);
+  checkEnd(file, header);
   if (!header.comments.empty())
     content.metadata["comment"] = fmt::format("{}", fmt::join(header.comments, "\n"));
   for (const PlyElement& element : header.elements)

@@ -29,7 +29,7 @@ bool recognize(std::string_view head) {
 volume::ParticleSet readParticles(FileReader& file, const PrtHeader& header,
                                   CacheContent& content) {
   const RecordLayout& layout = header.layout;
-  const bool unfinished = header.count < 0;
+  const bool unfinished = header.count == kPrtUnfinished;
   const std::uint64_t room = maxInflated(file.remaining()) / layout.stride;
   const std::uint64_t count = unfinished ? room : static_cast<std::uint64_t>(header.count);
   if (count > room)
@@ -39,7 +39,7 @@ volume::ParticleSet readParticles(FileReader& file, const PrtHeader& header,
   // Particles shrink to a half or a quarter; a header that promises more gets memory as it
   // delivers.
   const std::uint64_t likely = file.remaining() * 8 / layout.stride + 4096;
-  if (count == 0) return readRecords(layout, 0, 0, {});
+  if (count == 0 && file.remaining() == 0) return readRecords(layout, 0, 0, {});
   Inflate stream(file);
   volume::ParticleSet set = readRecords(
       layout, count, std::min(count, likely), [&](unsigned char* records, std::size_t wanted) {
@@ -56,7 +56,11 @@ volume::ParticleSet readParticles(FileReader& file, const PrtHeader& header,
         return bytes / layout.stride;
       });
   if (!unfinished && !stream.finish())
-    content.notes.push_back("holds more data than the particles that its header counts");
+    throw InputError(
+        file.path(),
+        fmt::format("holds more than the {} particles that its header counts: the file "
+                    "is damaged; write it again",
+                    count));
   if (unfinished)
     content.notes.push_back(
         fmt::format("the writer did not finish this file; it holds {} particles", set.size()));
