@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "photosphere/core/error.h"
+#include "photosphere/core/input_file.h"
 
 namespace photosphere::caches {
 
@@ -50,17 +51,16 @@ void ByteSource::skip(std::uint64_t size, std::string_view what) {
 }
 
 FileReader::FileReader(const fs::path& path) : m_path(path.string()) {
+  checkReadable(path, "a cache file");
   std::error_code error;
-  const fs::file_status status = fs::status(path, error);
-  if (!fs::exists(status)) throw InputMissingError(m_path, "no such file");
-  if (!fs::is_regular_file(status))
-    throw InputMissingError(m_path, "is not a file; name one cache file");
+  if (!fs::is_regular_file(path, error))
+    throw InputMissingError(m_path, "is not a regular file; copy it to one");
   m_size = fs::file_size(path, error);
   if (error) throw InputMissingError(m_path, error.message());
   m_buffer.resize(static_cast<std::size_t>(std::min<std::uint64_t>(m_size + 1, kBuffer)));
   m_file.rdbuf()->pubsetbuf(nullptr, 0);  // this class buffers
   m_file.open(path, std::ios::binary);
-  if (!m_file) throw InputMissingError(m_path, "cannot be opened; check its permissions");
+  if (!m_file) throw InputMissingError(m_path, "cannot be read");
 }
 
 bool FileReader::fill() {

@@ -208,7 +208,9 @@ SequenceReport inspectSequence(const std::string& pattern) {
   SequenceReport report;
   report.pattern = pattern;
   report.frames = findFrames(pattern);
-  if (report.frames.empty()) throw InputMissingError(pattern, "no frame of this pattern exists");
+  if (report.frames.empty())
+    throw InputMissingError(pattern,
+                            "no frame of this pattern exists; check its path and its number of #");
   report.holes = missingFrames(report.frames);
   if (!report.holes.empty())
     report.warnings.push_back(fmt::format("frames are missing: {}", formatFrames(report.holes)));

@@ -9,6 +9,7 @@
 #include <fstream>
 
 #include "photosphere/core/error.h"
+#include "photosphere/core/input_file.h"
 
 namespace photosphere::cameras {
 
@@ -119,13 +120,11 @@ std::vector<ChanKey> parseChan(std::string_view text, const std::string& name) {
 }
 
 std::vector<ChanKey> readChan(const std::string& path) {
+  checkReadable(path, "a .chan file");
   std::error_code error;
-  if (std::filesystem::is_directory(path, error))
-    throw InputMissingError(path, "is a folder, not a .chan file");
   std::ifstream in(path, std::ios::binary);
   const std::uintmax_t size = std::filesystem::file_size(path, error);
-  if (!in || error)
-    throw InputMissingError(path, "cannot open this file; check its name and permissions");
+  if (!in || error) throw InputMissingError(path, "cannot be read");
   if (size > kLargestFile)
     throw InputError(
         path, fmt::format("is {} bytes long; a .chan file has at most {}", size, kLargestFile));

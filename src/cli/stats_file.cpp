@@ -44,8 +44,8 @@ void StatsFile::keep(std::int64_t frame) {
     m_earlier = std::make_unique<Json>(Json::parse(in, nullptr, false));
     if (in.is_open() && !m_earlier->is_array())
       log::warning(
-          "{}: is no list of frames any more, so what it said of frames that are kept is lost; "
-          "render with --overwrite to have it again",
+          "{}: is damaged, and what it said of the frames that are kept is lost; --resume "
+          "never makes them again",
           m_path);
   }
   if (!m_earlier->is_array()) return;

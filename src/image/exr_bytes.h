@@ -9,6 +9,7 @@
 #include <string>
 
 #include "photosphere/core/error.h"
+#include "photosphere/core/input_file.h"
 
 namespace photosphere::image {
 
@@ -16,11 +17,12 @@ static_assert(std::endian::native == std::endian::little, "EXR is read as little
 
 class ExrBytes {
  public:
-  explicit ExrBytes(const std::filesystem::path& path)
-      : m_path(path.string()), m_in(path, std::ios::binary) {
+  explicit ExrBytes(const std::filesystem::path& path) : m_path(path.string()) {
+    checkReadable(path, "an EXR file");
     std::error_code error;
+    m_in.open(path, std::ios::binary);
     if (!m_in || !std::filesystem::is_regular_file(path, error))
-      throw InputMissingError(m_path, "cannot open this file; check its name and permissions");
+      throw InputMissingError(m_path, "is not a regular file; copy it to one");
     m_size = std::filesystem::file_size(path);
   }
 

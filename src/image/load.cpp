@@ -6,6 +6,7 @@
 
 #include "openimageio.h"
 #include "photosphere/core/error.h"
+#include "photosphere/core/input_file.h"
 #include "photosphere/core/resources.h"
 #include "photosphere/image/exr.h"
 
@@ -18,10 +19,9 @@ constexpr std::uint32_t kExrMagic = 20000630;
 constexpr std::uint64_t kLargestRatio = 2000;
 
 std::uint64_t checkedSize(const std::string& name) {
-  std::error_code error;
-  std::ifstream in(name, std::ios::binary);
-  if (!in || !std::filesystem::is_regular_file(name, error))
-    throw InputMissingError(name, "cannot open this file; check its name and permissions");
+  checkReadable(name, "a picture");
+  if (std::error_code error; !std::filesystem::is_regular_file(name, error))
+    throw InputMissingError(name, "is not a regular file; copy it to one");
   return std::filesystem::file_size(name);
 }
 

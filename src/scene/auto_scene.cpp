@@ -235,7 +235,9 @@ SceneFile sceneForVolume(const std::filesystem::path& path, const std::vector<st
   std::vector<std::string> choices;
   if (hasFrameToken(pattern)) {
     const std::vector<std::int64_t> frames = findFrames(pattern);
-    if (frames.empty()) throw InputMissingError(pattern, "no frame of this sequence exists");
+    if (frames.empty())
+      throw InputMissingError(
+          pattern, "no frame of this sequence exists; check its path and its number of #");
     frame = frames[frames.size() / 2];
     choices.push_back(fmt::format(
         "Camera and density_scale are chosen from frame {}, the middle of the sequence.", frame));

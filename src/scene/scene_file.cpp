@@ -8,6 +8,7 @@
 
 #include "photosphere/core/error.h"
 #include "photosphere/core/hash.h"
+#include "photosphere/core/input_file.h"
 #include "scene_reader.h"
 
 namespace photosphere::scene {
@@ -181,12 +182,9 @@ SceneFile parseScene(const std::string& text, const std::string& name,
 }
 
 SceneFile loadScene(const std::filesystem::path& path, const std::vector<std::string>& sets) {
+  checkReadable(path, "a scene file");
   std::ifstream in(path, std::ios::binary);
   std::ostringstream text;
-  if (std::filesystem::is_directory(path))
-    throw InputMissingError(path.string(), "is a folder, not a scene file");
-  if (!in)
-    throw InputMissingError(path.string(), "cannot open this file; check its name and permissions");
   if (in.peek() != std::ifstream::traits_type::eof()) text << in.rdbuf();
   if (!in.good() && !in.eof()) throw InputMissingError(path.string(), "cannot be read");
   const std::filesystem::path folder = std::filesystem::absolute(path).parent_path();

@@ -9,6 +9,7 @@
 // The parser behaves as that header makes it, in the whole program or nowhere.
 #include "../scene/toml_text.h"
 #include "photosphere/core/error.h"
+#include "photosphere/core/input_file.h"
 #include "photosphere/core/shipped_data.h"
 
 namespace photosphere::study {
@@ -176,9 +177,8 @@ std::vector<std::string> itemsOf(const toml::table& table) {
 }
 
 std::string readText(const fs::path& path) {
+  checkReadable(path, "a catalogue");
   std::ifstream in(path);
-  if (!in)
-    throw InputMissingError(path.string(), "cannot open this file; check its name and permissions");
   std::stringstream text;
   text << in.rdbuf();
   return text.str();

@@ -1,15 +1,13 @@
 #include "vdb_cursor.h"
 
 #include <fmt/format.h>
-#include <sys/stat.h>
 
 #include <algorithm>
 #include <bit>
-#include <cerrno>
 #include <cstring>
-#include <system_error>
 
 #include "photosphere/core/error.h"
+#include "photosphere/core/input_file.h"
 
 namespace photosphere::volume {
 
@@ -23,13 +21,10 @@ constexpr std::uint64_t kBlock = 1u << 16;
 }  // namespace
 
 VdbCursor::VdbCursor(const std::filesystem::path& path) : m_path(path.string()) {
-  struct stat info {};
-  if (stat(m_path.c_str(), &info) != 0)
-    throw InputMissingError(m_path, std::generic_category().message(errno));
-  if (S_ISDIR(info.st_mode)) throw InputMissingError(m_path, "is a folder, not a .vdb file");
+  checkReadable(path, "a .vdb file");
   m_in.rdbuf()->pubsetbuf(nullptr, 0);
   m_in.open(m_path, std::ios::binary);
-  if (!m_in) throw InputMissingError(m_path, std::generic_category().message(errno));
+  if (!m_in) throw InputMissingError(m_path, "cannot be read");
   m_in.seekg(0, std::ios::end);
   const std::streamoff size = m_in.tellg();
   if (!m_in || size < 0)

@@ -32,7 +32,8 @@ class Faults : public ::testing::Test {
     writePly(m_folder / "points.ply", ribbon(500, true));
     image::writeExr(m_folder / "a.exr", noise(1));
     image::writeExr(m_folder / "b.exr", noise(2));
-    for (const char* name : {"full.vdb", "full.csv", "full.prt", "full.png", "full.json"})
+    for (const char* name :
+         {"full.vdb", "full.exr", "full.csv", "full.prt", "full.png", "full.json"})
       fs::create_symlink("/dev/full", m_folder / name);
     fs::create_directory(m_folder / "study");
     fs::create_symlink("/dev/full", m_folder / "study/study.csv");
@@ -94,7 +95,27 @@ std::string nameOf(const ::testing::TestParamInfo<FaultCase>& info) {
   return info.param.name;
 }
 
+/// One part of the light of frame 1, whole, and what makes a light cache of it.
+#define SHARD "$P trace scene.toml --frames 1 --shard 1/1 -o s.vdb && "
+/// The row of the table of hard cases that takes least.
+#define HARD "$P study --hard --quick --case frame_1x1 --family single "
+
 const FaultCase kFullDisk[] = {
+    {"Frame",
+     "$P render scene.toml -o full.exr --frames 1",
+     6,
+     {"full.exr: cannot be written", "free some"}},
+    {"Merge",
+     SHARD "$P merge s.vdb -o full.vdb",
+     6,
+     {"full.vdb: cannot be written", "free some"},
+     {"s.vdb"}},
+    {"MergeStatistics",
+     SHARD "$P merge s.vdb -o x.vdb --stats full.json",
+     6,
+     {"full.json: cannot write", "free some"},
+     {"s.vdb", "x.vdb"}},
+    {"HardTable", HARD "-o full.csv", 6, {"full.csv: cannot", "free some"}},
     {"Trace",
      "$P trace scene.toml -o full.vdb --frames 1",
      6,
@@ -159,6 +180,11 @@ const FaultCase kFileSizeLimit[] = {
      "ulimit -f 8; $P convert points.ply -o x.prt",
      6,
      {"x.prt: cannot be written", "ulimit -f"}},
+    {"Merge",
+     SHARD "ulimit -f 8; $P merge s.vdb -o x.vdb",
+     6,
+     {"x.vdb: cannot be written", "ulimit -f"},
+     {"s.vdb"}},
     {"ErrorMap",
      "ulimit -f 8; $P compare a.exr b.exr --error-map x.exr",
      6,
@@ -167,6 +193,20 @@ const FaultCase kFileSizeLimit[] = {
 INSTANTIATE_TEST_SUITE_P(FileSizeLimit, FaultTable, ::testing::ValuesIn(kFileSizeLimit), nameOf);
 
 const FaultCase kFolderAsTarget[] = {
+    {"Frame",
+     "$P render scene.toml -o folder.exr --frames 1",
+     6,
+     {"folder.exr: is a folder", "name a file"}},
+    {"Merge",
+     SHARD "$P merge s.vdb -o folder.vdb",
+     6,
+     {"folder.vdb: is a folder", "name a file"},
+     {"s.vdb"}},
+    {"HardTable", HARD "-o study", 6, {"study: is a folder", "name a file"}},
+    {"FolderAsShard",
+     "$P merge folder.vdb -o x.vdb",
+     3,
+     {"folder.vdb: is a folder", "name a file"}},
     {"Trace",
      "$P trace scene.toml -o folder.vdb --frames 1",
      6,
@@ -184,9 +224,9 @@ const FaultCase kFolderAsTarget[] = {
      6,
      {"folder.exr: is a folder", "name a file"}},
     {"StudyIntoAFile", "$P study scene.toml -o scene.toml", 6, {"scene.toml", "cannot create"}},
-    {"FolderAsInput", "$P convert folder.vdb -o x.vdb", 3, {"folder.vdb"}},
-    {"FolderToInspect", "$P inspect folder.vdb", 3, {"folder.vdb"}},
-    {"FolderAsScene", "$P render study -o x.exr", 3, {"study"}},
+    {"FolderAsInput", "$P convert folder.vdb -o x.vdb", 3, {"folder.vdb: is a folder", "name a"}},
+    {"FolderToInspect", "$P inspect folder.vdb", 3, {"folder.vdb: is a folder", "name a file"}},
+    {"FolderAsScene", "$P render study -o x.exr", 3, {"study: is a folder", "name a file"}},
 };
 INSTANTIATE_TEST_SUITE_P(FolderAsTarget, FaultTable, ::testing::ValuesIn(kFolderAsTarget), nameOf);
 
@@ -194,24 +234,24 @@ const FaultCase kMemory[] = {
     {"Trace",
      "$P trace scene.toml -o x.vdb --frames 1 -s render.memory_limit=1e-6",
      5,
-     {"render.memory_limit"}},
+     {"raise render.memory_limit"}},
     {"Plan",
      "$P plan scene.toml --frames 1 -s render.memory_limit=1e-6",
      5,
-     {"render.memory_limit"}},
+     {"raise render.memory_limit"}},
     {"PathTraced",
      "$P render scene.toml -o x.exr --frames 1 -s estimator.type=path_traced "
      "-s render.memory_limit=1e-6",
      5,
-     {"render.memory_limit"}},
+     {"raise render.memory_limit"}},
     {"BareCache",
      "$P render smoke.0001.vdb -o x.exr -s render.memory_limit=1e-6",
      5,
-     {"render.memory_limit"}},
+     {"raise render.memory_limit"}},
     {"KeepGoing",
      "$P render scene.toml -o x.####.exr --keep-going -s render.memory_limit=1e-6",
      8,
-     {"render.memory_limit", "3 of 3 frames failed"}},
+     {"raise render.memory_limit", "3 of 3 frames failed"}},
     {"Seeding",
      "$P convert smoke.0001.vdb -o x.vdb --particles 100000000000",
      5,
@@ -259,6 +299,7 @@ TEST_F(Faults, LockedFolder) {
   }
   fs::create_directory(m_folder / "locked");
   fs::permissions(m_folder / "locked", fs::perms(0555));
+  ASSERT_EQ(shell(SHARD "true").exitCode, 0);
   const std::string scene = " scene.toml --frames 1 -o locked/";
   for (const auto& [command, file] : std::initializer_list<std::pair<std::string, std::string>>{
            {"render" + scene + "x.exr", "locked/x.exr"},
@@ -267,7 +308,9 @@ TEST_F(Faults, LockedFolder) {
            {"trace" + scene + "x.vdb", "locked/x.vdb"},
            {"convert points.ply -o locked/x.csv", "locked/x.csv"},
            {"convert smoke.0001.vdb -o locked/x.vdb", "locked/x.vdb"},
+           {"merge s.vdb -o locked/x.vdb", "locked/x.vdb"},
            {"compare a.exr b.exr --error-map locked/x.exr", "locked/x.exr"},
+           {"study --hard --case frame_1x1 -o locked/x.csv", "locked/x.csv"},
            {"study scene.toml --quick -o locked/report", "locked/report"}})
     expectFailure(run + command, 6, {file, "write elsewhere"});
   fs::permissions(m_folder / "locked", fs::perms(0755));
@@ -284,14 +327,24 @@ class Disappearing : public Faults, public ::testing::WithParamInterface<const c
       fs::remove(m_folder / ("smoke." + frame + ".vdb"));
       volume::writeVdb(m_folder / ("smoke." + frame + ".vdb"), {ballOfSmoke(0.1)});
     }
+    if (lost() == "shard.0015.vdb") {
+      ASSERT_EQ(shell("$P trace scene.toml --frames 1-16 --shard 1/1 -o shard.####.vdb").exitCode,
+                0);
+    }
   }
   std::string extension() const {
     return std::string(GetParam()).find("render") != std::string::npos ? "exr" : "vdb";
   }
+  /// The input that goes.
+  std::string lost() const {
+    return std::string(GetParam()).find("merge") != std::string::npos ? "shard.0015.vdb"
+                                                                      : "smoke.0015.vdb";
+  }
   RunResult run(const std::string& more) {
     return shell(std::string(GetParam()) + more + " & n=0; while [ ! -e out/x.0001." + extension() +
                  " ] && [ $n -lt 3000 ]; do sleep 0.01; n=$((n+1)); done; kill -s STOP $!; "
-                 "rm smoke.0015.vdb; kill -s CONT $!; wait $!");
+                 "rm " +
+                 lost() + "; kill -s CONT $!; wait $!");
   }
   std::set<std::string> outputs(std::initializer_list<int> missing) const {
     std::set<std::string> names;
@@ -305,14 +358,16 @@ class Disappearing : public Faults, public ::testing::WithParamInterface<const c
 TEST_P(Disappearing, InputEndsTheCommandWithWhatWasDone) {
   const RunResult result = run("");
   EXPECT_EQ(result.exitCode, 3) << result.err;
-  EXPECT_NE(result.err.find("smoke.0015.vdb"), std::string::npos) << result.err;
+  EXPECT_NE(result.err.find(lost() + ": no such file; check its path"), std::string::npos)
+      << result.err;
   EXPECT_EQ(namesIn(m_folder / "out"), outputs({15, 16}));
 }
 
 TEST_P(Disappearing, InputIsOneFailedFrameWhereOthersGoOn) {
   const RunResult result = run(" --keep-going");
   EXPECT_EQ(result.exitCode, 8) << result.err;
-  EXPECT_NE(result.err.find("smoke.0015.vdb"), std::string::npos) << result.err;
+  EXPECT_NE(result.err.find(lost() + ": no such file; check its path"), std::string::npos)
+      << result.err;
   EXPECT_NE(result.err.find("1 of 16 frames failed: 15"), std::string::npos) << result.err;
   EXPECT_EQ(namesIn(m_folder / "out"), outputs({15}));
 }
@@ -320,6 +375,7 @@ TEST_P(Disappearing, InputIsOneFailedFrameWhereOthersGoOn) {
 INSTANTIATE_TEST_SUITE_P(Commands, Disappearing,
                          ::testing::Values("$P render scene.toml -o out/x.####.exr --res 16x12",
                                            "$P trace scene.toml -o out/x.####.vdb",
+                                           "$P merge shard.####.vdb -o out/x.####.vdb",
                                            "$P convert smoke.####.vdb -o out/x.####.vdb "
                                            "--particles 500"),
                          [](const auto& test) {

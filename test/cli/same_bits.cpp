@@ -381,6 +381,18 @@ TEST_F(Interrupted, FinishedFramesAreNotMadeAgain) {
   EXPECT_NE(fs::last_write_time(m_folder / "x.0001.exr"), written);
 }
 
+TEST_F(Interrupted, FiguresThatWereDamagedMeanwhileAreMissed) {
+  const std::string job =
+      "render scene.toml -o x.####.exr --stats s.json --float --frames 1-2 -s "
+      "estimator.type=path_traced -s estimator.samples=1200";
+  ASSERT_EQ(signalAt(job, "x.0001.exr").exitCode, 75);
+  writeText(m_folder / "s.json", "[{\"frame\": 1,");
+  const RunResult rest = runShell(std::string(PHOTOSPHERE_TOOL) + " " + job, m_folder.path());
+  EXPECT_EQ(rest.exitCode, 0) << rest.err;
+  EXPECT_NE(rest.err.find("s.json: is damaged"), std::string::npos) << rest.err;
+  EXPECT_NE(readText(m_folder / "s.json").find("\"frame\": 2,"), std::string::npos);
+}
+
 // What a frame missed before the interruption still decides the exit code: the one that is left has
 // no smoke, and so nothing to miss.
 TEST_F(Interrupted, AMissedTargetIsNotForgotten) {

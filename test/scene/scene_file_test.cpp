@@ -318,7 +318,7 @@ TEST(SceneFileTest, TheHashFollowsPixelsAndNotPlaces) {
 
 TEST(SceneFileTest, AMissingFileIsNamedWithTheRemedy) {
   EXPECT_TRUE(contains(complaint([] { loadScene("nothere.toml"); }, ExitCode::inputMissing),
-                       "nothere.toml: cannot open this file; check its name"));
+                       "nothere.toml: no such file; check its path"));
 }
 
 TEST(SceneFileTest, PathsAreRelativeToTheFile) {
