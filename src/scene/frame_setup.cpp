@@ -133,6 +133,7 @@ void heedParallax(const SceneFile& scene, FrameSetup& setup) {
 // Radius of the kernel over fluence that the work grows with the third power of [light voxels].
 // Four are mush already (automaticRadius).
 constexpr int kMostVoxelsWide = 8;
+constexpr double kHalfDiagonal = 0.8661;  // of a cube of edge 1, and a little
 
 // Light is kept in voxels of two density voxels unless the scene says otherwise, or the smoke is
 // few of them across or several mean free paths deep in each: what light does inside a voxel is
@@ -229,6 +230,25 @@ void buildLayout(const SceneFile& scene, const SetupOptions& options, FrameSetup
       l.radius = l.holdsPower() && spacings > 0 ? spacings : std::max(l.radius, spacings);
     }
   }
+  // Particles are read by way of light voxels: one whose kernel meets the centre of none would lose
+  // its light.
+  const double narrowest = kHalfDiagonal * l.lightVoxel * setup.medium->voxelEdge();
+  if (l.carrier == Carrier::particles && l.radius < narrowest) {
+    if (e.real("radius") > 0)
+      setup.notes.push_back(fmt::format(
+          "estimator.radius = {:.4g} is less than light voxels are apart; their half diagonal, "
+          "{:.4g}, is taken (lower estimator.light_voxel for less)",
+          e.real("radius"), narrowest / setup.space.metersPerUnit));
+    l.radius = narrowest;
+  }
+  const Vec3d extent = setup.medium->bounds().extent();
+  const double across = std::max({extent.x, extent.y, extent.z});
+  if (e.real("radius") > 0 && !setup.medium->bounds().empty() && l.radius > across &&
+      (l.carrier == Carrier::particles || e.text("type") == "photon_map"))
+    setup.notes.push_back(fmt::format(
+        "estimator.radius = {:.4g} is wider than the smoke, {:.4g}: light scattered many times is "
+        "spread far over its edge (0 chooses a radius)",
+        e.real("radius"), across / setup.space.metersPerUnit));
   const double widest = kMostVoxelsWide * l.lightVoxel * setup.medium->voxelEdge();
   if (e.text("type") == "photosphere" && !l.holdsPower() && l.radius > widest) {
     setup.notes.push_back(

@@ -1,6 +1,9 @@
 #include "photon_map_stage.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cmath>
 
 #include "light_stage.h"
 #include "photosphere/core/resources.h"
@@ -51,7 +54,18 @@ void planPhotonMap(const SceneFile& scene, FrameSetup& setup) {
   estimators::PhotonForecast whole = forecast;  // of all batches, whose mean the frame is
   whole.photons *= static_cast<std::uint64_t>(setup.batches);
   map.radius = e.real("radius") * setup.space.metersPerUnit;
-  if (map.radius > 0) return;
+  if (map.radius > 0) {
+    const double held = static_cast<double>(whole.photons) * 4.0 / 3.0 * kPi *
+                        std::pow(map.radius, 3) / std::max(forecast.volume, 1e-300);
+    if (held < 1 && forecast.photons > 0 && e.integer("neighbors") == 0)
+      setup.notes.push_back(fmt::format(
+          "estimator.radius = {:.4g} holds {:.2g} photons where the mean photon is: light "
+          "scattered "
+          "many times will be specks or none (0 would be {:.4g})",
+          e.real("radius"), held,
+          estimators::automaticRadius(*setup.medium, whole) / setup.space.metersPerUnit));
+    return;
+  }
   // Where the nearest photons make the radius, the automatic one only keeps it from growing over
   // empty space.
   map.radius = e.integer("neighbors") > 0 ? kWidestBall * setup.medium->voxelEdge()

@@ -34,12 +34,23 @@ void append(Sets& to, const Sets& more) {
   to.insert(to.end(), more.begin(), more.end());
 }
 
-// Lamps in place of the scene's one, with its light in equal parts.
-void shareLight(scene::SceneFile& scene, int lamps) {
+// Lamps in place of the scene's one, with its light in equal parts: at its place, or in a cube
+// about it.
+void shareLight(scene::SceneFile& scene, int lamps, double spread) {
   if (lamps < 2) return;
   scene::LightEntry part = scene.lights.front();
   part.values.set("intensity", part.values.real("intensity") / lamps, part.where);
   scene.lights.assign(static_cast<std::size_t>(lamps), part);
+  if (spread == 0) return;
+  // Roberts' sequence: multiples of the powers of 1/g, g^4 = g + 1, fill a cube evenly.
+  const Vec3d steps(0.81917251339616443, 0.67104360670378920, 0.54970047790197026);
+  const Vec3d place = part.values.vec3("position");
+  for (int i = 0; i < lamps; ++i) {
+    const Vec3d p =
+        place + spread * (glm::fract(Vec3d(0.5) + steps * static_cast<double>(i + 1)) - Vec3d(0.5));
+    scene.lights[static_cast<std::size_t>(i)].values.set(
+        "position", std::vector<double>{p.x, p.y, p.z}, part.where);
+  }
 }
 
 std::string numberText(double value) {
@@ -197,7 +208,7 @@ class Table {
     StabilityFrameJob job;
     job.scene = sceneWith(smokeFile(smoke), sets);
     job.scene.allowInvalid = c.allowInvalid;
-    shareLight(job.scene, lamps);
+    shareLight(job.scene, lamps, c.spread);
     if (c.crop.size() == 4)
       job.request.crop = render::Crop{{c.crop[0], c.crop[1]}, {c.crop[2], c.crop[3]}};
     job.layer = c.layer;
@@ -244,12 +255,13 @@ class Table {
     }
     append(sets, o.set);
     const SmokeSpec& smoke = o.ownSmoke ? o.smoke : c.smoke;
-    std::string key = o.kind + smoke.key();
+    const int lamps = o.kind == "same" ? 0 : c.lights;
+    std::string key = fmt::format("{} {} lamps in {} {}", o.kind, lamps, c.spread, smoke.key());
     for (const std::string& set : sets)
       key += "\n" + set;
     const auto known = m_frames.find(key);
     if (known != m_frames.end()) return known->second;
-    StabilityFrameJob job = jobOf(c, smoke, sets, o.kind == "same" ? 0 : c.lights);
+    StabilityFrameJob job = jobOf(c, smoke, sets, lamps);
     job.request.crop.reset();
     if (o.kind == "finer") makeFiner(job.scene);
     job.cpuLimit *= kFiner;

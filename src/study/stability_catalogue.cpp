@@ -144,6 +144,7 @@ StabilityCase readCase(const toml::table& table, const std::string& file, const 
   from.number("block", c.block);
   from.number("seeds", c.seeds);
   from.number("lights", c.lights);
+  from.number("spread", c.spread);
   from.flag("allow_invalid", c.allowInvalid);
   if (const toml::node* node = from.find("crop"))
     if (const toml::array* numbers = node->as_array())

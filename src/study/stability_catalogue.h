@@ -45,9 +45,10 @@ struct StabilityCase {
   bool quick = true;                                     ///< in the small size, too
   std::string layer = "beauty";
   std::string metric = "blocks";
-  int block = 8;   ///< edge of the blocks [pixels]
-  int seeds = 1;   ///< frames whose mean is the result
-  int lights = 0;  ///< lamps that share the base's light; 0 = as the scene has
+  int block = 8;      ///< edge of the blocks [pixels]
+  int seeds = 1;      ///< frames whose mean is the result
+  int lights = 0;     ///< lamps that share the base's light; 0 = as the scene has
+  double spread = 0;  ///< edge of the cube about its place that they stand in [scene units]
   bool allowInvalid = false;
   std::vector<int> crop;
   std::string says;    ///< what a note must say

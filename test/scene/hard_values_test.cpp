@@ -110,6 +110,41 @@ TEST_F(HardValues, OneHugeParticleIsNamed) {
   EXPECT_EQ(complaint([&] { setUp(file, {"volume.0.particle_radius=0.2"}); }), "");
 }
 
+// A kernel that meets no light voxel, or no photon, would leave out what is scattered many times,
+// and one that is wider than the smoke nearly so: said, or mended where it can be.
+TEST_F(HardValues, RadiiThatLoseLightAreNamed) {
+  volume::ParticleSet set;
+  for (int i = 0; i < 1000; ++i)
+    set.positions.emplace_back(0.1 * (i % 10), 0.1 * (i / 10 % 10), 0.1 * (i / 100));
+  set.add({"pscale", 1, std::vector<float>(1000, 0.1f)});
+  const std::string file = write("a.vdb", {volume::pointsToGrid(set, "points", 1)});
+  const auto withRadius = [&](const char* way, const char* radius) {
+    return setUp(file, {way, std::string("estimator.radius=") + radius, "estimator.photons=20000"});
+  };
+  const char* const particles = "estimator.carrier=particles";
+  const char* const map = "estimator.type=photon_map";
+  const FrameSetup tiny = withRadius(particles, "1e-6");
+  EXPECT_TRUE(notes(tiny, "estimator.radius = 1e-06 is less than light voxels are apart"));
+  const double edge = tiny.layout.lightVoxel * tiny.medium->voxelEdge();
+  EXPECT_GE(tiny.layout.radius, std::sqrt(0.75) * edge);
+  EXPECT_LT(tiny.layout.radius, edge);
+  EXPECT_TRUE(notes(withRadius(map, "1e-6"), "estimator.radius = 1e-06 holds"));
+  for (const char* way : {particles, map}) {
+    EXPECT_TRUE(notes(withRadius(way, "100"), "estimator.radius = 100 is wider than the smoke"));
+    for (const char* usual : {"0", "0.3"})
+      EXPECT_FALSE(notes(withRadius(way, usual), "estimator.radius")) << way << usual;
+  }
+  // One alone has no spacing to choose a radius by.
+  set.positions.resize(1);
+  set.attributes.clear();
+  set.add({"pscale", 1, std::vector<float>{0.1f}});
+  const FrameSetup alone =
+      setUp(write("b.vdb", {volume::pointsToGrid(set, "points", 1)}), {particles});
+  EXPECT_GE(alone.layout.radius,
+            std::sqrt(0.75) * alone.layout.lightVoxel * alone.medium->voxelEdge());
+  EXPECT_FALSE(notes(alone, "estimator.radius"));
+}
+
 // Particles at rest in a ball, and one that a simulation lost.
 volume::ParticleSet withStray(double distance) {
   volume::ParticleSet set;
