@@ -1,5 +1,8 @@
 #include "allocation_limit.h"
 
+#include <malloc.h>
+
+#include <algorithm>
 #include <atomic>
 #include <cstdlib>
 #include <limits>
@@ -14,11 +17,13 @@ namespace {
 constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
 std::atomic<std::size_t> g_limit{kNone};
 std::atomic<std::size_t> g_refused{0};
+std::atomic<std::ptrdiff_t> g_held{0};  ///< since the limit began
 
 }  // namespace
 
 AllocationLimit::AllocationLimit(std::size_t bytes) {
   g_refused = 0;
+  g_held = 0;
   g_limit = bytes;
 }
 
@@ -32,12 +37,21 @@ std::size_t AllocationLimit::refused() const {
 
 /// What replaced operator new does.
 void* limitedAllocation(std::size_t size) {
-  if (size > g_limit) {
+  const std::size_t limit = g_limit;
+  const auto held = static_cast<std::size_t>(std::max<std::ptrdiff_t>(0, g_held));
+  if (size > limit || (limit != kNone && held + size > 2 * limit)) {
     if (size > g_refused) g_refused = size;
     throw std::bad_alloc();
   }
-  if (void* memory = std::malloc(size > 0 ? size : 1)) return memory;
-  throw std::bad_alloc();
+  void* memory = std::malloc(size > 0 ? size : 1);
+  if (!memory) throw std::bad_alloc();
+  g_held += static_cast<std::ptrdiff_t>(malloc_usable_size(memory));
+  return memory;
+}
+
+void limitedRelease(void* memory) {
+  if (memory) g_held -= static_cast<std::ptrdiff_t>(malloc_usable_size(memory));
+  std::free(memory);
 }
 
 }  // namespace photosphere::fuzz
@@ -50,15 +64,15 @@ void* operator new[](std::size_t size) {
   return photosphere::fuzz::limitedAllocation(size);
 }
 void operator delete(void* memory) noexcept {
-  std::free(memory);
+  photosphere::fuzz::limitedRelease(memory);
 }
 void operator delete[](void* memory) noexcept {
-  std::free(memory);
+  photosphere::fuzz::limitedRelease(memory);
 }
 void operator delete(void* memory, std::size_t) noexcept {
-  std::free(memory);
+  photosphere::fuzz::limitedRelease(memory);
 }
 void operator delete[](void* memory, std::size_t) noexcept {
-  std::free(memory);
+  photosphere::fuzz::limitedRelease(memory);
 }
 #endif

@@ -12,6 +12,7 @@
 #include "allocation_limit.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/log.h"
+#include "photosphere/core/resources.h"
 
 namespace photosphere::fuzz {
 
@@ -22,6 +23,9 @@ namespace fs = std::filesystem;
 /// One process is asked so often before the next begins: memory that one input damaged must not be
 /// there for all.
 constexpr std::size_t kBatch = 100;
+
+/// Processor time of an input that nothing justifies: each takes milliseconds [s].
+constexpr double kHang = test::kSanitized ? 100 : 10;
 
 bool ofTheInput(ExitCode code) {
   return code == ExitCode::usage || code == ExitCode::inputMissing ||
@@ -48,10 +52,15 @@ void giveHere(const Target& target, const std::string& bytes, const std::string&
               const fs::path& folder, Outcomes& outcomes) {
   // Deflate makes up to 1032 bytes of one, and a reader may hold them twice.
   const AllocationLimit limit(target.room + 2100 * bytes.size());
+  const double before = processCpuSeconds();
   const std::string complaint = give(target, bytes, folder, outcomes);
+  const double seconds = processCpuSeconds() - before;
   const std::size_t refused = limit.refused();
   if (refused > 0)
     ADD_FAILURE() << what << ": asked for " << refused << " bytes of memory for an input of "
+                  << bytes.size();
+  if (seconds > kHang)
+    ADD_FAILURE() << what << ": " << seconds << " s of processor time for an input of "
                   << bytes.size();
   if (!complaint.empty()) ADD_FAILURE() << what << ": " << complaint;
 }
