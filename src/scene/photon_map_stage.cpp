@@ -59,9 +59,8 @@ void planPhotonMap(const SceneFile& scene, FrameSetup& setup) {
                         std::pow(map.radius, 3) / std::max(forecast.volume, 1e-300);
     if (held < 1 && forecast.photons > 0 && e.integer("neighbors") == 0)
       setup.notes.push_back(fmt::format(
-          "estimator.radius = {:.4g} holds {:.2g} photons where the mean photon is: light "
-          "scattered "
-          "many times will be specks or none (0 would be {:.4g})",
+          "estimator.radius = {:.4g} holds {:.2g} photons where the mean photon is: light that is "
+          "scattered many times will be specks or none (0 would be {:.4g})",
           e.real("radius"), held,
           estimators::automaticRadius(*setup.medium, whole) / setup.space.metersPerUnit));
     return;
