@@ -51,12 +51,7 @@ void ByteSource::skip(std::uint64_t size, std::string_view what) {
 }
 
 FileReader::FileReader(const fs::path& path) : m_path(path.string()) {
-  checkReadable(path, "a cache file");
-  std::error_code error;
-  if (!fs::is_regular_file(path, error))
-    throw InputMissingError(m_path, "is not a regular file; copy it to one");
-  m_size = fs::file_size(path, error);
-  if (error) throw InputMissingError(m_path, error.message());
+  m_size = readableSize(path, "a cache file");
   m_buffer.resize(static_cast<std::size_t>(std::min<std::uint64_t>(m_size + 1, kBuffer)));
   m_file.rdbuf()->pubsetbuf(nullptr, 0);  // this class buffers
   m_file.open(path, std::ios::binary);

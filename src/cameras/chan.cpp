@@ -120,17 +120,14 @@ std::vector<ChanKey> parseChan(std::string_view text, const std::string& name) {
 }
 
 std::vector<ChanKey> readChan(const std::string& path) {
-  checkReadable(path, "a .chan file");
-  std::error_code error;
+  const std::uint64_t size = readableSize(path, "a .chan file");
   std::ifstream in(path, std::ios::binary);
-  const std::uintmax_t size = std::filesystem::file_size(path, error);
-  if (!in || error) throw InputMissingError(path, "cannot be read");
   if (size > kLargestFile)
     throw InputError(
         path, fmt::format("is {} bytes long; a .chan file has at most {}", size, kLargestFile));
   std::string text(static_cast<std::size_t>(size), '\0');
   in.read(text.data(), static_cast<std::streamsize>(text.size()));
-  if (in.bad() || static_cast<std::uintmax_t>(in.gcount()) != size)
+  if (!in || static_cast<std::uint64_t>(in.gcount()) != size)
     throw InputMissingError(path, "cannot be read");
   return parseChan(text, path);
 }

@@ -28,4 +28,12 @@ void checkReadable(const std::filesystem::path& path, std::string_view kind) {
                                                      std::generic_category().message(reason)));
 }
 
+std::uint64_t readableSize(const std::filesystem::path& path, std::string_view kind) {
+  checkReadable(path, kind);
+  std::error_code error;
+  const std::uintmax_t size = std::filesystem::file_size(path, error);
+  if (error) throw InputMissingError(path.string(), "is not a regular file; copy it to one");
+  return size;
+}
+
 }  // namespace photosphere

@@ -18,12 +18,9 @@ static_assert(std::endian::native == std::endian::little, "EXR is read as little
 class ExrBytes {
  public:
   explicit ExrBytes(const std::filesystem::path& path) : m_path(path.string()) {
-    checkReadable(path, "an EXR file");
-    std::error_code error;
+    m_size = readableSize(path, "an EXR file");
     m_in.open(path, std::ios::binary);
-    if (!m_in || !std::filesystem::is_regular_file(path, error))
-      throw InputMissingError(m_path, "is not a regular file; copy it to one");
-    m_size = std::filesystem::file_size(path);
+    if (!m_in) throw InputMissingError(m_path, "cannot be read");
   }
 
   std::uint64_t size() const { return m_size; }

@@ -18,13 +18,6 @@ constexpr std::uint32_t kExrMagic = 20000630;
 /// Flat regions compress best in deflate, at 1032 to 1; a file that claims much more is damaged.
 constexpr std::uint64_t kLargestRatio = 2000;
 
-std::uint64_t checkedSize(const std::string& name) {
-  checkReadable(name, "a picture");
-  if (std::error_code error; !std::filesystem::is_regular_file(name, error))
-    throw InputMissingError(name, "is not a regular file; copy it to one");
-  return std::filesystem::file_size(name);
-}
-
 bool isExr(const std::string& name) {
   std::uint32_t magic = 0;
   std::ifstream in(name, std::ios::binary);
@@ -84,7 +77,7 @@ LoadedImage fromOther(const std::string& name, std::uint64_t fileSize) {
 
 LoadedImage loadImage(const std::filesystem::path& path) {
   const std::string name = path.string();
-  const std::uint64_t fileSize = checkedSize(name);
+  const std::uint64_t fileSize = readableSize(name, "a picture");
   // Our own reader checks more.
   if (isExr(name)) return fromExr(name);
   try {

@@ -45,7 +45,7 @@ using Change = std::function<void(std::string& bytes, std::size_t at)>;
 
 class Damage : public testing::TestWithParam<Specimen> {
  protected:
-  const std::string& whole() const { return GetParam().bytes; }
+  const std::string& whole() const { return m_whole; }
   const Target& target() const { return *findTarget(GetParam().target); }
 
   /// Damages the whole at every place, in each of the ways in turn.
@@ -84,6 +84,8 @@ class Damage : public testing::TestWithParam<Specimen> {
     return vdb && i % 256 != 0 &&
            whole().substr(begin, end - begin).find_first_not_of('\0') == std::string::npos;
   }
+
+  const std::string m_whole = GetParam().content();
 };
 
 Change flip(unsigned char mask) {
@@ -156,10 +158,11 @@ TEST(Targets, EachHasASoundSpecimen) {
   for (const Specimen& specimen : specimens()) {
     const Target* target = findTarget(specimen.target);
     ASSERT_NE(target, nullptr) << specimen.target;
-    ASSERT_FALSE(specimen.bytes.empty()) << specimen.target << ' ' << specimen.name;
+    const std::string bytes = specimen.content();
+    ASSERT_FALSE(bytes.empty()) << specimen.target << ' ' << specimen.name;
     const auto name = [&](std::size_t) { return specimen.target + " " + specimen.name; };
     EXPECT_EQ(attempt(
-                  *target, 1, [&](std::size_t) { return specimen.bytes; }, name)
+                  *target, 1, [&](std::size_t) { return bytes; }, name)
                   .read,
               1)
         << name(0);

@@ -9,7 +9,6 @@
 #include <cstring>
 
 #include "openimageio.h"
-
 #include "photosphere/caches/cache_format.h"
 #include "photosphere/core/checkpoint.h"
 #include "photosphere/core/error.h"
@@ -306,8 +305,10 @@ void addPictures(std::vector<Specimen>& all) {
   for (const auto& [format, compression] :
        {std::pair("png", ""), std::pair("jpeg", ""), std::pair("tiff", "zip"),
         std::pair("tiff", "lzw"), std::pair("bmp", ""), std::pair("targa", "")})
-    all.push_back({"picture", std::string(format) + (*compression ? "_" : "") + compression,
-                   picture(format, compression)});
+    all.push_back(
+        {"picture", std::string(format) + (*compression ? "_" : "") + compression, {}, [=] {
+           return picture(format, compression);
+         }});
   all.push_back({"ocio", "curve", kColorConfig});
 }
 

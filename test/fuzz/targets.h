@@ -32,6 +32,9 @@ const Target* findTarget(std::string_view name);
 /// A small sound input of a target.
 struct Specimen {
   std::string target, name, bytes;
+  std::function<std::string()> make = {};  ///< in place of bytes that take long to make
+
+  std::string content() const { return make ? make() : bytes; }
 };
 
 /// The target that reads a format's files of this extension; extensions that a reader treats alike

@@ -41,7 +41,7 @@ void writeFile(const fs::path& path, const std::string& bytes) {
 void writeSeeds(const Target& target, const fs::path& folder) {
   fs::create_directories(folder);
   for (const auto& specimen : photosphere::fuzz::specimens())
-    if (specimen.target == target.name) writeFile(folder / specimen.name, specimen.bytes);
+    if (specimen.target == target.name) writeFile(folder / specimen.name, specimen.content());
   std::string words;
   for (const std::string& word : target.words) {
     words += '"';
