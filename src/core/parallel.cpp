@@ -30,28 +30,48 @@ namespace photosphere {
 namespace {
 
 // Tells the thread sanitizer what the uninstrumented libtbb keeps from it: that a loop's bodies
-// begin after its start, and that its end follows them all. Nothing in other builds.
-struct LoopEdges {
+// begin after its start, and that its end follows them all, by an exception too. Nothing in other
+// builds.
+class LoopEdges {
+ public:
 #ifdef PHOTOSPHERE_TSAN
-  char begin = 0, end = 0;
-  void started() {
-    __tsan_release(&begin);
+  LoopEdges() {
+    __tsan_release(&m_begin);
+  }
+  ~LoopEdges() {
+    __tsan_acquire(&m_end);
   }
   void bodyBegins() {
-    __tsan_acquire(&begin);
+    __tsan_acquire(&m_begin);
   }
   void bodyEnds() {
-    __tsan_release(&end);
+    __tsan_release(&m_end);
   }
-  void finished() {
-    __tsan_acquire(&end);
-  }
+
+ private:
+  char m_begin = 0, m_end = 0;
 #else
-  void started() {}
+  LoopEdges() {}
+  ~LoopEdges() {}
   void bodyBegins() {}
   void bodyEnds() {}
-  void finished() {}
 #endif
+
+ public:
+  LoopEdges(const LoopEdges&) = delete;
+  LoopEdges& operator=(const LoopEdges&) = delete;
+};
+
+// One body of a loop, from its first instruction to its last, or to what it throws.
+class BodyEdges {
+ public:
+  explicit BodyEdges(LoopEdges& loop) : m_loop(loop) { m_loop.bodyBegins(); }
+  ~BodyEdges() { m_loop.bodyEnds(); }
+  BodyEdges(const BodyEdges&) = delete;
+  BodyEdges& operator=(const BodyEdges&) = delete;
+
+ private:
+  LoopEdges& m_loop;
 };
 
 }  // namespace
@@ -86,15 +106,13 @@ void parallelFor(std::size_t count, std::size_t grain,
   const unsigned threads = static_cast<unsigned>(
       tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
   LoopEdges edges;
-  edges.started();
   auto loop = [&] {
     tbb::parallel_for(
         tbb::blocked_range<std::size_t>(0, count, std::max<std::size_t>(1, grain)),
         [&](const tbb::blocked_range<std::size_t>& range) {
-          edges.bodyBegins();
+          const BodyEdges bodyEdges(edges);
           throwIfInterrupted();
           body(range.begin(), range.end());
-          edges.bodyEnds();
         },
         tbb::simple_partitioner());
   };
@@ -105,7 +123,6 @@ void parallelFor(std::size_t count, std::size_t grain,
   } else {
     loop();
   }
-  edges.finished();
 }
 
 }  // namespace photosphere

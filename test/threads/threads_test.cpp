@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <stdexcept>
 #include <thread>
@@ -59,14 +60,22 @@ TEST(Threads, LoopsInsideLoopsJoinToo) {
     EXPECT_EQ(sum, 1000);
 }
 
+// What the other bodies did before the loop was left may be read, and what they used be gone.
 TEST(Threads, AnExceptionInALoopReachesTheCaller) {
   const ThreadLimit limit(4);
-  EXPECT_THROW(parallelFor(kItems, 16,
-                           [](std::size_t begin, std::size_t end) {
-                             if (begin <= kItems / 2 && kItems / 2 < end)
-                               throw std::runtime_error("stop");
-                           }),
-               std::runtime_error);
+  for (int round = 0; round < 200; ++round) {
+    std::vector<int> visits(kItems, 0);
+    EXPECT_THROW(parallelFor(kItems, 16,
+                             [&](std::size_t begin, std::size_t end) {
+                               for (std::size_t i = begin; i < end; ++i)
+                                 ++visits[i];
+                               if (begin <= kItems / 2 && kItems / 2 < end)
+                                 throw std::runtime_error("stop");
+                             }),
+                 std::runtime_error);
+    EXPECT_EQ(visits[kItems / 2], 1) << round;
+    EXPECT_LE(*std::max_element(visits.begin(), visits.end()), 1) << round;
+  }
 }
 
 TEST(Threads, LogLevelsMayChangeWhileOthersLog) {
