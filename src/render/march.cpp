@@ -2,6 +2,7 @@
 #include <optional>
 #include <type_traits>
 
+#include "backgrounds.h"
 #include "final_gather.h"
 #include "instances.h"
 
@@ -50,7 +51,7 @@ class MarchIntegrator final : public Integrator {
   MarchIntegrator(const Medium& medium, const transport::LightList& lights, const Shadows& shadows,
                   const estimators::InscatterSource* source, const MarchOptions& options)
       : m_medium(medium),
-        m_lights(lights),
+        m_backgrounds(backgroundsOf(medium, lights)),
         m_direct(medium, lights, shadows, options.effects.shadows,
                  source && source->carriesUnscattered()),
         m_source(source),
@@ -86,7 +87,7 @@ class MarchIntegrator final : public Integrator {
     result.single = glm::max(result.single, Rgb(0.0f));
     result.multiple = glm::max(result.multiple, Rgb(0.0f));
     result.transmittance = Rgb(transmittance);
-    for (const auto& light : m_lights)
+    for (const lights::Light* light : m_backgrounds)
       result.background += transmittance * light->background(direction);
     return result;
   }
@@ -228,7 +229,7 @@ class MarchIntegrator final : public Integrator {
   }
 
   const Medium& m_medium;
-  const transport::LightList& m_lights;
+  std::vector<const lights::Light*> m_backgrounds;
   DirectLight m_direct;
   const estimators::InscatterSource* m_source;
   MarchOptions m_options;

@@ -2,6 +2,7 @@
 #include <optional>
 #include <type_traits>
 
+#include "backgrounds.h"
 #include "instances.h"
 #include "lamp_choice.h"
 #include "near_lamps.h"
@@ -25,9 +26,9 @@ class PathIntegrator final : public Integrator {
                  const PathOptions& options)
       : m_medium(medium),
         m_options(options),
-        m_emission(options.effects.emission ? medium.emission() : nullptr) {
+        m_emission(options.effects.emission ? medium.emission() : nullptr),
+        m_backgrounds(backgroundsOf(medium, lights)) {
     for (const auto& light : lights) {
-      m_backgrounds.push_back(light.get());
       const bool sampled =
           !light->isUniform() || options.environment == EnvironmentSampling::nextEvent;
       (sampled ? m_sampled : m_escaped).push_back(light.get());
@@ -261,8 +262,8 @@ class PathIntegrator final : public Integrator {
   const Medium& m_medium;
   PathOptions m_options;
   const transport::Emission* m_emission;            // nullptr where there is none
+  std::vector<const lights::Light*> m_backgrounds;  // what unscattered rays meet
   std::vector<const lights::Light*> m_sampled;      // lamps of next-event estimation
-  std::vector<const lights::Light*> m_backgrounds;  // every lamp: what unscattered rays meet
   std::vector<const lights::Light*> m_escaped;      // what scattered rays meet by leaving
   std::vector<double> m_cumulative;
   std::optional<LampChoice> m_choice;  // of many lamps

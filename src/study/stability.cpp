@@ -29,6 +29,7 @@ using Sets = std::vector<std::string>;
 
 constexpr double kCpuLimit = 120, kQuickCpuLimit = 30;  // seconds a run
 constexpr int kFiner = 10;
+constexpr int kQuickShare = 8;  // of the small size: paths held against are so many times fewer
 
 void append(Sets& to, const Sets& more) {
   to.insert(to.end(), more.begin(), more.end());
@@ -66,12 +67,14 @@ class Table {
                                                                      : options.catalogue)),
         m_folder(fs::temp_directory_path() / fmt::format("photosphere-hard-{}", getpid())) {
     checkNames();
+    if (m_options.quick)
+      for (StabilityCase& c : m_catalogue.cases)
+        append(c.set, c.quickSet);
   }
 
   std::vector<StabilityRow> run() {
     for (const StabilityCase& c : m_catalogue.cases) {
       if (!chosen(c) || (m_options.quick && !c.quick)) continue;
-      m_frames.clear();
       if (c.trace == "slab_radiance") {
         runSlabRadiance(c);
       } else if (!c.trace.empty()) {
@@ -248,15 +251,17 @@ class Table {
     if (o.kind == "path") {
       append(sets, e.truth);
       append(sets, {"estimator.type=\"path_traced\"", "scene.seed=77",
-                    fmt::format("estimator.samples={}",
-                                (o.samples > 0 ? o.samples : 2048) / (m_options.quick ? 4 : 1))});
+                    fmt::format("estimator.samples={}", (o.samples > 0 ? o.samples : 2048) /
+                                                            (m_options.quick ? kQuickShare : 1))});
     } else {
       append(sets, e.set);
     }
     append(sets, o.set);
     const SmokeSpec& smoke = o.ownSmoke ? o.smoke : c.smoke;
     const int lamps = o.kind == "same" ? 0 : c.lights;
-    std::string key = fmt::format("{} {} lamps in {} {}", o.kind, lamps, c.spread, smoke.key());
+    std::string key =
+        fmt::format("{} {} of {}, crop {}, {} lamps in {} {}", o.kind, c.layer, c.allowInvalid,
+                    fmt::join(c.crop, " "), lamps, c.spread, smoke.key());
     for (const std::string& set : sets)
       key += "\n" + set;
     const auto known = m_frames.find(key);
@@ -425,7 +430,8 @@ class Table {
   const std::function<void(const StabilityRow&)>& m_each;
   StabilityCatalogue m_catalogue;
   RunFolder m_folder;
-  std::map<std::string, StabilityFrame> m_frames;  // of one case
+  // What frames are held against, by all that it follows from.
+  std::map<std::string, StabilityFrame> m_frames;
   std::vector<StabilityRow> m_rows;
 };
 

@@ -136,6 +136,7 @@ StabilityCase readCase(const toml::table& table, const std::string& file, const 
   from.values("smoke", c.smoke);
   from.values("slab", c.slab);
   from.texts("set", c.set);
+  from.texts("quick_set", c.quickSet);
   from.texts("estimators", c.estimators);
   from.texts("quick_estimators", c.quickEstimators);
   from.flag("quick", c.quick);

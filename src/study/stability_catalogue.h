@@ -40,7 +40,7 @@ struct StabilityCase {
   std::string trace;  ///< empty = a frame is rendered; else what is done instead
   SmokeSpec slab;     ///< of `trace`: tau, albedo, g, photons
   SmokeSpec smoke;
-  std::vector<std::string> set;
+  std::vector<std::string> set, quickSet;                ///< `quickSet`: more of the small size
   std::vector<std::string> estimators, quickEstimators;  ///< empty = all, as `estimators`
   bool quick = true;                                     ///< in the small size, too
   std::string layer = "beauty";
