@@ -1,6 +1,7 @@
 #include "deposit.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 
 namespace photosphere::estimators {
@@ -32,6 +33,20 @@ void CarrierSums::add(const B& basis, const typename B::Along& along, const Flig
                       std::uint32_t& counter) const {
   const std::size_t base = carrier * m_stride + static_cast<std::size_t>(set) * m_setSize;
   const auto bits = [&] { return roundingBits(m_key, flight.photon, flight.ordinal, counter++); };
+  if constexpr (B::kMost > 0) {
+    static_assert(B::kSigned && !B::kKeepsMeans);
+    std::array<std::int64_t, static_cast<std::size_t>(3 * B::kMost)> whole;
+    std::size_t count = 0;
+    m_sums.prefetchRow(base, m_setSize);
+    basis.at(flight, along, p, [&](int, float weight) {
+      for (int c = 0; c < m_channels; ++c)
+        whole[count++] = m_sums.wholeSigned(
+            static_cast<double>(amount[c]) * static_cast<double>(weight), bits());
+    });
+    const RowLocks::Hold hold = m_locks->hold(carrier);
+    m_sums.addRow(base, {whole.data(), count});
+    return;
+  }
   basis.at(flight, along, p, [&](int value, float weight) {
     for (int c = 0; c < m_channels; ++c) {
       const std::size_t at = base + static_cast<std::size_t>(value * m_channels + c);

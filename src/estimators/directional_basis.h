@@ -8,6 +8,7 @@
 //   at(flight, along, p, visit)       calls visit(value, weight) for light that arrives at p
 //   B::kSigned                        weights may be negative
 //   B::kKeepsMeans                    values are bins, which also keep their mean direction
+//   B::kMost                          0, or: each flight adds to all values, at most so many
 // `value` counts groups of `channels` floats within a set. For `kKeepsMeans` see LightFieldLayout.
 
 #include <array>
@@ -23,6 +24,7 @@ namespace photosphere::estimators {
 /// Histogram, all light in the bin that holds the direction.
 struct NearestBin {
   static constexpr bool kSigned = false, kKeepsMeans = false;
+  static constexpr int kMost = 0;
   struct Along {
     int bin = 0;
   };
@@ -40,6 +42,7 @@ struct NearestBin {
 /// Histogram, light shared among bins.
 struct SharedBins {
   static constexpr bool kSigned = false, kKeepsMeans = false;
+  static constexpr int kMost = 0;
   struct Along {
     std::vector<sphere::BinShare> shares;
     int count = 0;
@@ -68,6 +71,7 @@ struct WithMeans : Bins {
 /// Spherical harmonics: light times each of them.
 struct Harmonics {
   static constexpr bool kSigned = true, kKeepsMeans = false;
+  static constexpr int kMost = sphere::SphericalHarmonics::kMaxCount;
   struct Along {
     std::array<float, sphere::SphericalHarmonics::kMaxCount> values;
   };
@@ -87,6 +91,7 @@ struct Harmonics {
 /// by the layout's kernel over directions.
 struct TowardEye {
   static constexpr bool kSigned = false, kKeepsMeans = false;
+  static constexpr int kMost = 0;
   struct Along {};
   void begin(const transport::Flight&, Along&) const {}
   template <class Visit>

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <limits>
 #include <stdexcept>
 #include <thread>
 #include <vector>
@@ -32,6 +33,46 @@ TEST(Threads, SumsThatManyThreadsAddToLoseNothing) {
   for (const std::int64_t sum : sums)
     total += sum;
   EXPECT_EQ(total, static_cast<std::int64_t>(4 * (kItems * (kItems - 1) / 2)));
+}
+
+// Rows of sums, added whole under a lock, of which few serve many rows.
+TEST(Threads, RowsThatManyThreadsAddToLoseNothing) {
+  constexpr std::size_t kRows = 3, kWide = 100;
+  FixedSums sums;
+  sums.sums.assign(kRows * kWide, 0);
+  const RowLocks locks;
+  std::vector<std::thread> threads;
+  for (int t = 0; t < 4; ++t)
+    threads.emplace_back([&] {
+      std::vector<std::int64_t> row(kWide);
+      for (std::size_t i = 0; i < kItems; ++i) {
+        for (std::size_t k = 0; k < kWide; ++k)
+          row[k] = k % 2 ? -static_cast<std::int64_t>(k) : static_cast<std::int64_t>(k);
+        const RowLocks::Hold hold = locks.hold(i % kRows);
+        sums.addRow(i % kRows * kWide, row);
+      }
+    });
+  for (std::thread& thread : threads)
+    thread.join();
+  for (std::size_t r = 0; r < kRows; ++r) {
+    const auto times = static_cast<std::int64_t>(4 * ((kItems + kRows - 1 - r) / kRows));
+    for (std::size_t k = 0; k < kWide; ++k)
+      ASSERT_EQ(sums.sums[r * kWide + k],
+                times * (k % 2 ? -static_cast<std::int64_t>(k) : static_cast<std::int64_t>(k)));
+  }
+  EXPECT_EQ(sums.overflows, 0u);
+}
+
+// A row counts what leaves the range of its sums, as single sums do.
+TEST(Threads, RowsCountWhatOverflows) {
+  FixedSums sums;
+  constexpr std::int64_t kMost = std::numeric_limits<std::int64_t>::max();
+  sums.sums = {kMost - 1, -kMost, 5};
+  sums.addRow(0, std::vector<std::int64_t>{1, -1, 1});
+  EXPECT_EQ(sums.overflows, 0u);
+  sums.addRow(0, std::vector<std::int64_t>{1, -1, 1});
+  EXPECT_EQ(sums.overflows, 2u);
+  EXPECT_EQ(sums.sums[2], 7);
 }
 
 TEST(Threads, LoopVisitsEveryItemOnceAndItsWritesAreSeenAfterIt) {

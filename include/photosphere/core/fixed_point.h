@@ -5,6 +5,9 @@
 #include <atomic>
 #include <cmath>
 #include <cstdint>
+#include <memory>
+#include <span>
+#include <thread>
 #include <vector>
 
 #include "photosphere/core/rng.h"
@@ -23,8 +26,13 @@ inline std::int64_t quantize(double value, double inverseQuantum, std::uint32_t 
 
 /// The same for values of either sign: bins of directions, spherical harmonics.
 inline std::int64_t quantizeSigned(double value, double inverseQuantum, std::uint32_t bits) {
-  return value < 0 ? -quantize(-value, inverseQuantum, bits)
-                   : quantize(value, inverseQuantum, bits);
+  // As -quantize(-value, ...) below zero, without asking which: the signs of harmonics are anyone's
+  // guess.
+  const double scaled = value * inverseQuantum;
+  const auto whole = static_cast<std::int64_t>(scaled);
+  const double fraction = std::abs(scaled - static_cast<double>(whole));
+  const std::int64_t away = fraction > static_cast<double>(bits) * 0x1p-32 ? 1 : 0;
+  return whole + (scaled < 0 ? -away : away);
 }
 
 /// Adds to a sum that other threads may add to at the same time.
@@ -56,7 +64,37 @@ inline std::uint32_t roundingBits(RandomKey key, std::uint64_t photon, std::uint
   return static_cast<std::uint32_t>(depositHash(key, photon, flight, deposit) >> 32);
 }
 
-/// Integer sums and the worth of one unit. Many threads may add at once.
+/// Locks of rows of sums: to hold one costs what adding one sum alone does, so rows of many sums
+/// are better added under a lock. Rows share locks; a thread holds one at a time, and not for long.
+class RowLocks {
+ public:
+  class Hold {
+   public:
+    explicit Hold(std::atomic<bool>& taken) : m_taken(taken) {
+      for (int tries = 0; m_taken.exchange(true, std::memory_order_acquire); ++tries)
+        if (tries % 64 == 63) std::this_thread::yield();
+    }
+    ~Hold() { m_taken.store(false, std::memory_order_release); }
+    Hold(const Hold&) = delete;
+    Hold& operator=(const Hold&) = delete;
+
+   private:
+    std::atomic<bool>& m_taken;
+  };
+
+  /// Neighbours have locks far from each other, not to wait for one cache line.
+  Hold hold(std::size_t row) const {
+    return Hold(m_taken[(static_cast<std::uint64_t>(row) * 0x9e3779b97f4a7c15ull) >> kShift]);
+  }
+
+ private:
+  static constexpr int kBits = 14, kShift = 64 - kBits;
+  std::unique_ptr<std::atomic<bool>[]> m_taken =
+      std::make_unique<std::atomic<bool>[]>(std::size_t{1} << kBits);
+};
+
+/// Integer sums and the worth of one unit. Many threads may add at once, either by `add` and
+/// `addSigned` or by `addRow`.
 struct FixedSums {
   std::vector<std::int64_t> sums;
   double quantum = 1.0;
@@ -72,11 +110,28 @@ struct FixedSums {
   }
   /// The same for a value of either sign.
   void addSigned(std::size_t at, double value, std::uint32_t bits) {
+    addWhole(at, wholeSigned(value, bits));
+  }
+  /// What `addSigned` would add: whole units; 0, and counted, where they are too many.
+  std::int64_t wholeSigned(double value, std::uint32_t bits) {
     const double units = value / quantum;
-    if (std::abs(units) < kMost)
-      addWhole(at, quantizeSigned(units, 1.0, bits));
-    else
-      overflows.fetch_add(1, std::memory_order_relaxed);
+    if (std::abs(units) < kMost) return quantizeSigned(units, 1.0, bits);
+    overflows.fetch_add(1, std::memory_order_relaxed);
+    return 0;
+  }
+  /// Has the memory of `count` sums come near, while something else is computed.
+  void prefetchRow(std::size_t at, std::size_t count) const {
+    constexpr std::size_t kLine = 64 / sizeof(std::int64_t);
+    for (std::size_t i = 0; i < count; i += kLine)
+      __builtin_prefetch(sums.data() + at + i, 1);
+  }
+  /// Adds whole units to sums that lie one behind another, while no other thread adds to them.
+  void addRow(std::size_t at, std::span<const std::int64_t> whole) {
+    std::int64_t* const row = sums.data() + at;
+    std::uint64_t lost = 0;
+    for (std::size_t i = 0; i < whole.size(); ++i)
+      lost += __builtin_add_overflow(row[i], whole[i], &row[i]) ? 1 : 0;
+    if (lost > 0) overflows.fetch_add(lost, std::memory_order_relaxed);
   }
 
  private:
