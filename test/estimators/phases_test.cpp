@@ -40,7 +40,7 @@ TEST(Phases, AgreeWithPathTracing) {
         sampledVolume(1.0, 64, {.albedo = 0.9, .extinction = 40.0}, plumeDensity);
     smoke.phase = row.phase;
     const TestScene scene = plumeScene(std::move(smoke), 48);
-    const Truth truth = pathTruth(scene, 128);
+    const Truth truth = pathTruth(scene, 64);
     const auto error = [&](const render::FrameLayers& layers) {
       EXPECT_EQ(layers.nanSamples + layers.negativeSamples, 0u) << row.name;
       return truth.errorOf(layers, &render::FrameLayers::multiple);

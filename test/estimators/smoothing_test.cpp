@@ -111,7 +111,7 @@ TEST(FluenceSmoothing, FewPhotonsHaveTheMeanOfMany) {
 
 // A bin's light that is read beside a needle is below zero, and made up for by its neighbours'.
 TEST(FluenceSmoothing, FewPhotonsInBinsHaveTheMeanOfMany) {
-  expectTheMeanOfMany(0.95, Basis::histogram, 24, 2'000'000, 0.05);
+  expectTheMeanOfMany(0.95, Basis::histogram, 16, 1'000'000, 0.05);
 }
 
 std::vector<Vec3f> pointsInBall(int count) {
@@ -136,7 +136,7 @@ TEST_P(OpaqueVoxels, KeepWhatIsSeenOfThem) {
     layout.channels = 1;
     layout.smoothing = way;
     layout.radius = 0.5 * layout.lightVoxel * scene.medium->voxelEdge();
-    const PhotosphereFrame frame = renderPhotosphere(scene, layout, 200'000, 5);
+    const PhotosphereFrame frame = renderPhotosphere(scene, layout, 100'000, 5);
     const LayerError e = truth.errorOf(frame.layers, &render::FrameLayers::multiple);
     std::printf(
         "  %s %s %s %-8s mean %.4f  relMSE %.5f\n", std::string(nameOf(layout.basis)).c_str(),
@@ -191,7 +191,7 @@ TEST(FluenceSmoothing, WhatTheEyeSeesOfCollisionsIsKept) {
   layout.deposit = Deposit::collision;
   layout.smoothing = Smoothing::visible;
   layout.radius = 0.5 * layout.lightVoxel * scene.medium->voxelEdge();
-  const PhotosphereFrame frame = renderPhotosphere(scene, layout, 200'000, 5);
+  const PhotosphereFrame frame = renderPhotosphere(scene, layout, 100'000, 5);
   EXPECT_NEAR(truth.errorOf(frame.layers, &render::FrameLayers::multiple).meanRatio, 1.0, 0.08);
 }
 

@@ -67,7 +67,7 @@ TEST_F(AimScene, SteeringIsUnbiased) {
   };
   for (const auto& lamp : lamps) {
     std::vector<std::string> sets = lamp;
-    sets.push_back("estimator.photons=300000");
+    sets.push_back("estimator.photons=150000");
     sets.push_back("camera.fov=9");
     const FrameResult even = renderScene(make(closeUp("off", sets)), 1);
     const FrameResult aimed = renderScene(make(closeUp("on", sets)), 1);

@@ -182,10 +182,10 @@ class TargetError : public ::testing::Test {
   std::string m_file;
 };
 
-// What each estimator says of itself against path tracing with a hundred times the samples.
+// What each estimator says of itself against path tracing with sixty times the samples.
 TEST_F(TargetError, TheEstimateIsTheErrorThatThereIs) {
   if (kSanitized) GTEST_SKIP() << "a truth of many paths, too slow under a sanitizer";
-  const FrameResult truth = render({"estimator.type=path_traced", "estimator.samples=4000"});
+  const FrameResult truth = render({"estimator.type=path_traced", "estimator.samples=2000"});
   const std::vector<std::string> ways[] = {
       {"estimator.type=path_traced", "estimator.samples=32"},
       {"estimator.type=light_traced", "estimator.samples=32"},
@@ -219,7 +219,7 @@ TEST_F(TargetError, OfACropIsThatOfItsPixels) {
     const auto with = [&](const std::vector<std::string>& sets) {
       return renderScene(scene(sets), 1, request);
     };
-    const FrameResult truth = with({"estimator.type=path_traced", "estimator.samples=10000"});
+    const FrameResult truth = with({"estimator.type=path_traced", "estimator.samples=5000"});
     for (std::vector<std::string> sets :
          {std::vector<std::string>{"estimator.type=path_traced", "estimator.samples=32"},
           {"estimator.type=light_traced", "estimator.samples=32"},
