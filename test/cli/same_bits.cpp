@@ -51,8 +51,8 @@ struct Way {
 void PrintTo(const Way& way, std::ostream* out) {
   *out << way.name;
 }
-const std::vector<std::string> kManyPhotons{"-s", "estimator.photons=3000000", "-s",
-                                            "render.samples=300"};
+const std::vector<std::string> kManyPhotons{"-s", "estimator.photons=2000000", "-s",
+                                            "render.samples=200"};
 const std::vector<std::string> kSomePhotons{"-s", "estimator.photons=600000", "-s",
                                             "render.samples=100"};
 const Way kWays[] = {
@@ -321,12 +321,12 @@ TEST_F(Shards, SequencesMergeFrameByFrame) {
 TEST_F(Shards, OfATraceThatWasKilled) {
   const std::string line = std::string(PHOTOSPHERE_TOOL) +
                            " trace scene.toml -o x.vdb --frames 1 --shard 1/2 -s "
-                           "estimator.photons=8000000";
+                           "estimator.photons=3000000";
   const RunResult whole = runShell(
       std::string(PHOTOSPHERE_TOOL) +
-          " trace scene.toml -o a.vdb --frames 1 --shard 1/2 -s estimator.photons=8000000 && " +
+          " trace scene.toml -o a.vdb --frames 1 --shard 1/2 -s estimator.photons=3000000 && " +
           std::string(PHOTOSPHERE_TOOL) +
-          " trace scene.toml -o b.vdb --frames 1 --shard 2/2 -s estimator.photons=8000000",
+          " trace scene.toml -o b.vdb --frames 1 --shard 2/2 -s estimator.photons=3000000",
       m_folder.path());
   ASSERT_EQ(whole.exitCode, 0) << whole.err;
   const RunResult killed = runShell(
@@ -393,7 +393,7 @@ TEST_F(Interrupted, EndsWith75AndGoesOn) {
 TEST_F(Interrupted, FinishedFramesAreNotMadeAgain) {
   const std::string job =
       "render scene.toml -o x.####.exr --stats s.json --float --frames 1-3 -s "
-      "estimator.type=path_traced -s estimator.samples=1200";
+      "estimator.type=path_traced -s estimator.samples=400";
   const RunResult stopped = signalAt(job, "x.0001.exr");
   ASSERT_EQ(stopped.exitCode, 75) << stopped.err;
   const auto written = fs::last_write_time(m_folder / "x.0001.exr");
@@ -417,7 +417,7 @@ TEST_F(Interrupted, FinishedFramesAreNotMadeAgain) {
 TEST_F(Interrupted, FiguresThatWereDamagedMeanwhileAreMissed) {
   const std::string job =
       "render scene.toml -o x.####.exr --stats s.json --float --frames 1-2 -s "
-      "estimator.type=path_traced -s estimator.samples=1200";
+      "estimator.type=path_traced -s estimator.samples=400";
   ASSERT_EQ(signalAt(job, "x.0001.exr").exitCode, 75);
   writeText(m_folder / "s.json", "[{\"frame\": 1,");
   const RunResult rest = runShell(std::string(PHOTOSPHERE_TOOL) + " " + job, m_folder.path());
