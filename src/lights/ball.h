@@ -55,6 +55,8 @@ class BallLight : public SurfaceLight {
     const Vec3d normal = directionInCone(axis, 2 * static_cast<double>(u.x), u.y);
     return {m_center + normal * m_radius, normal};
   }
+  // Points at the same angle to that axis have the same power.
+  Vec2i nodes(const BoundingSphere&) const override { return {kSurfaceNodes, 1}; }
   double area() const override { return 4 * kPi * m_radius * m_radius; }
   const Vec3d& center() const override { return m_center; }
   double extent() const override { return m_radius; }

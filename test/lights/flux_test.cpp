@@ -96,6 +96,7 @@ TEST_P(Flux, PhotonsCarryThePowerAndMeetTheSphere) {
   }
   const double power = static_cast<double>(light->power(c.bounds).r);
   EXPECT_NEAR(mean.mean() / power, 1.0, 4.5 * mean.error() / power + 1e-5);
+  EXPECT_NEAR(light->roughPower(c.bounds) / power, 1.0, 0.1);
 }
 
 const BoundingSphere unit{{0, 0, 0}, 1};

@@ -75,6 +75,11 @@ class Light {
   /// Power that reaches the bounding sphere when nothing is in the way [W], per channel: what
   /// photon emission draws from. Zero for a light that cannot reach it.
   virtual Rgb power(const BoundingSphere& bounds) const = 0;
+  /// The same of the largest channel, up to a factor near 1, at least 0 and 0 only where no light
+  /// gets: what a lamp is chosen by that is one of many, at many places.
+  virtual double roughPower(const BoundingSphere& bounds) const {
+    return std::max(0.0, maxComponent(Vec3d(power(bounds))));
+  }
   /// What a plan may rely on: fluence 0 says that no light reaches the sphere.
   virtual Reach reach(const BoundingSphere& bounds) const {
     (void)bounds;
