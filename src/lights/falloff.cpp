@@ -17,7 +17,7 @@ double fractionInside(double theta, double between, double cone) {
 
 }  // namespace
 
-double sharedSolidAngle(const Falloff& falloff, const Vec3d& axis, const Cone& cone) {
+double sharedSolidAngle(const Falloff& falloff, const Vec3d& axis, const Cone& cone, int nodes) {
   const double between = oneMinusCosBetween(axis, cone.axis);
   const double gamma = angleFromOneMinusCos(between);
   const double beta = angleFromOneMinusCos(cone.oneMinusCos);
@@ -28,7 +28,6 @@ double sharedSolidAngle(const Falloff& falloff, const Vec3d& axis, const Cone& c
   for (double& angle : ends)
     angle = std::clamp(angle, 0.0, end);
   std::sort(ends.begin(), ends.end());
-  constexpr int nodes = 96;
   double sum = 0;
   for (std::size_t piece = 0; piece + 1 < ends.size(); ++piece) {
     const double width = ends[piece + 1] - ends[piece];

@@ -63,6 +63,9 @@ inline Reach spotReach(const Vec3d& position, const Vec3d& axis, double intensit
 /// Integral of the falloff over the solid angle that the spot shares with a cone [sr]. Pieces
 /// between the angles where the integrand has a kink; t^2 (3 - 2 t) flattens the square roots at
 /// their ends.
-double sharedSolidAngle(const Falloff& falloff, const Vec3d& axis, const Cone& cone);
+/// @param nodes  of each piece; a few tell it to some hundredths, and 0 only where it is
+double sharedSolidAngle(const Falloff& falloff, const Vec3d& axis, const Cone& cone,
+                        int nodes = 96);
+inline constexpr int kRoughNodes = 8;
 
 }  // namespace photosphere::lights

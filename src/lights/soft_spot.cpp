@@ -1,5 +1,8 @@
 #include "soft_spot.h"
 
+#include <mutex>
+#include <optional>
+
 #include "ball.h"
 #include "photosphere/core/sampling.h"
 
@@ -68,30 +71,22 @@ class SoftSpot final : public Light {
         m_falloff(falloff),
         m_radius(radius) {}
 
-  /// Over directions: the spot's intensity times the share of its lines that meet the sphere.
+  /// Costs thousands of square roots, and is asked in every pass for the same sphere.
   Rgb power(const BoundingSphere& bounds) const override {
-    const Cone reach = reachOf(bounds);
-    const double distance = glm::length(bounds.center - m_center);
-    const auto share = [&](double angle) {
-      return Beam(distance, angle, m_radius, bounds.radius).share();
-    };
-    // Up to the first angle the share is constant: the smaller of the two discs lies in the other.
-    const bool apart = distance > bounds.radius + m_radius;
-    const double first = apart ? exactAsin(std::abs(bounds.radius - m_radius) / distance) : 0.0;
-    // From there on, where the spot has light.
-    const double between = angleFromOneMinusCos(oneMinusCosBetween(m_axis, reach.axis));
-    const double begin = std::max(first, between - m_falloff.angle());
-    const double end =
-        std::min(angleFromOneMinusCos(reach.oneMinusCos), between + m_falloff.angle());
-    double before = shared(reach.axis, first);
-    double sum = share(first / 2) * before;
-    constexpr int steps = 96;
-    for (int i = 0; i < steps && end > begin; ++i) {
-      const double now = shared(reach.axis, begin + (end - begin) * (i + 1) / steps);
-      sum += share(begin + (end - begin) * (i + 0.5) / steps) * (now - before);
-      before = now;
-    }
-    return m_intensity * static_cast<float>(sum);
+    const std::lock_guard lock(m_mutex);
+    if (!m_known || m_known->first.center != bounds.center ||
+        m_known->first.radius != bounds.radius)
+      m_known.emplace(bounds, integratedPower(bounds));
+    return m_known->second;
+  }
+
+  /// As if a point sent what the ball does, a part of it past the sphere.
+  double roughPower(const BoundingSphere& bounds) const override {
+    const double size = bounds.radius + m_radius;
+    const bool apart = glm::length(bounds.center - m_center) > size;
+    const double part = apart ? bounds.radius / size : std::min(1.0, bounds.radius / m_radius);
+    return std::max(0.0, maxComponent(Vec3d(m_intensity))) * part * part *
+           sharedSolidAngle(m_falloff, m_axis, reachOf(bounds), kRoughNodes);
   }
 
   /// Its solid angle is at most that of a disc at the ball's nearest point.
@@ -164,7 +159,8 @@ class SoftSpot final : public Light {
 
   // Integral of the falloff within an angle of an axis [sr].
   double shared(const Vec3d& axis, double angle) const {
-    return sharedSolidAngle(m_falloff, m_axis, {axis, oneMinusCos(angle)});
+    constexpr int nodes = 32;  // a hundred of these integrals make a power
+    return sharedSolidAngle(m_falloff, m_axis, {axis, oneMinusCos(angle)}, nodes);
   }
 
   static bool reaches(const BoundingSphere& bounds, const Vec3d& origin, const Vec3d& direction) {
@@ -175,6 +171,37 @@ class SoftSpot final : public Light {
     return squared > 0 && ahead + std::sqrt(squared) > 0;
   }
 
+  // Over directions: the spot's intensity times the share of its lines that meet the sphere.
+  Rgb integratedPower(const BoundingSphere& bounds) const {
+    const Cone reach = reachOf(bounds);
+    const double distance = glm::length(bounds.center - m_center);
+    // Within the sphere all lines begin in it.
+    if (distance + m_radius <= bounds.radius)
+      return m_intensity * static_cast<float>(shared(reach.axis, kPi));
+    const auto share = [&](double angle) {
+      return Beam(distance, angle, m_radius, bounds.radius).share();
+    };
+    // Up to the first angle the share is constant: the smaller of the two discs lies in the other.
+    const bool apart = distance > bounds.radius + m_radius;
+    const double first = apart ? exactAsin(std::abs(bounds.radius - m_radius) / distance) : 0.0;
+    // From there on, where the spot has light.
+    const double between = angleFromOneMinusCos(oneMinusCosBetween(m_axis, reach.axis));
+    const double begin = std::max(first, between - m_falloff.angle());
+    const double end =
+        std::min(angleFromOneMinusCos(reach.oneMinusCos), between + m_falloff.angle());
+    double before = shared(reach.axis, first);
+    double sum = share(first / 2) * before;
+    constexpr int steps = 96;
+    for (int i = 0; i < steps && end > begin; ++i) {
+      const double now = shared(reach.axis, begin + (end - begin) * (i + 1) / steps);
+      sum += share(begin + (end - begin) * (i + 0.5) / steps) * (now - before);
+      before = now;
+    }
+    return m_intensity * static_cast<float>(sum);
+  }
+
+  mutable std::mutex m_mutex;
+  mutable std::optional<std::pair<BoundingSphere, Rgb>> m_known;  // power toward the last sphere
   Vec3d m_center, m_axis;
   Rgb m_intensity;  // far away, on the axis [W/sr]
   Falloff m_falloff;

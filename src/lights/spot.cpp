@@ -18,6 +18,12 @@ class SpotLight final : public Light {
                                       m_falloff, m_axis, coneToward(m_source.position(), bounds)));
   }
 
+  double roughPower(const BoundingSphere& bounds) const override {
+    return std::max(0.0, maxComponent(Vec3d(m_source.intensity()))) *
+           sharedSolidAngle(m_falloff, m_axis, coneToward(m_source.position(), bounds),
+                            kRoughNodes);
+  }
+
   Reach reach(const BoundingSphere& bounds) const override {
     return spotReach(m_source.position(), m_axis, maxComponent(Vec3d(m_source.intensity())),
                      m_falloff, 0.0, bounds);
