@@ -32,34 +32,31 @@ namespace {
 // Tells the thread sanitizer what the uninstrumented libtbb keeps from it: that a loop's bodies
 // begin after its start, and that its end follows them all, by an exception too. Nothing in other
 // builds.
-class LoopEdges {
- public:
-#ifdef PHOTOSPHERE_TSAN
-  LoopEdges() {
-    __tsan_release(&m_begin);
-  }
-  ~LoopEdges() {
-    __tsan_acquire(&m_end);
-  }
-  void bodyBegins() {
-    __tsan_acquire(&m_begin);
-  }
-  void bodyEnds() {
-    __tsan_release(&m_end);
-  }
-
- private:
-  char m_begin = 0, m_end = 0;
-#else
-  LoopEdges() {}
-  ~LoopEdges() {}
-  void bodyBegins() {}
-  void bodyEnds() {}
-#endif
-
- public:
+struct LoopEdges {
+  LoopEdges() { started(); }
+  ~LoopEdges() { finished(); }
   LoopEdges(const LoopEdges&) = delete;
   LoopEdges& operator=(const LoopEdges&) = delete;
+#ifdef PHOTOSPHERE_TSAN
+  char begin = 0, end = 0;
+  void started() {
+    __tsan_release(&begin);
+  }
+  void bodyBegins() {
+    __tsan_acquire(&begin);
+  }
+  void bodyEnds() {
+    __tsan_release(&end);
+  }
+  void finished() {
+    __tsan_acquire(&end);
+  }
+#else
+  void started() {}
+  void bodyBegins() {}
+  void bodyEnds() {}
+  void finished() {}
+#endif
 };
 
 // One body of a loop, from its first instruction to its last, or to what it throws.

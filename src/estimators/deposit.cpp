@@ -43,7 +43,6 @@ void CarrierSums::add(const B& basis, const typename B::Along& along, const Flig
         whole[count++] = m_sums.wholeSigned(
             static_cast<double>(amount[c]) * static_cast<double>(weight), bits());
     });
-    const RowLocks::Hold hold = m_locks->hold(carrier);
     m_sums.addRow(base, {whole.data(), count});
     return;
   }

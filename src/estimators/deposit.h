@@ -52,8 +52,7 @@ class CarrierSums {
   DirectionalBasis m_basis;
   RandomKey m_key;
   FixedSums& m_sums;
-  std::shared_ptr<RowLocks> m_locks = std::make_shared<RowLocks>();  // of carriers
-  std::vector<bool> m_wantsUnscattered;                              // by lamp
+  std::vector<bool> m_wantsUnscattered;  // by lamp
 };
 
 /// Deposits on the active voxels of a lattice: power times length (track length), or power over

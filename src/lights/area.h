@@ -63,11 +63,11 @@ class SurfaceLight : public Light {
   }
 
   /// Of a few points: all of a flat lamp see the sphere before them, or none.
-  double roughPower(const BoundingSphere& bounds) const override {
+  Rgb roughPower(const BoundingSphere& bounds) const override {
     constexpr int kRough = 8;
     const Vec2i count = nodes(bounds);
-    return std::max(0.0, maxComponent(Vec3d(m_radiance))) *
-           etendue(bounds, count.y > 1 ? glm::min(count, Vec2i(kRough)) : count);
+    return m_radiance * static_cast<float>(
+                            etendue(bounds, count.y > 1 ? glm::min(count, Vec2i(kRough)) : count));
   }
 
   Emission emit(const BoundingSphere& bounds, const Vec4f& u) const override {

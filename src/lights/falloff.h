@@ -63,9 +63,9 @@ inline Reach spotReach(const Vec3d& position, const Vec3d& axis, double intensit
 /// Integral of the falloff over the solid angle that the spot shares with a cone [sr]. Pieces
 /// between the angles where the integrand has a kink; t^2 (3 - 2 t) flattens the square roots at
 /// their ends.
-/// @param nodes  of each piece; a few tell it to some hundredths, and 0 only where it is
-double sharedSolidAngle(const Falloff& falloff, const Vec3d& axis, const Cone& cone,
-                        int nodes = 96);
-inline constexpr int kRoughNodes = 8;
+/// @param nodes  of each piece
+double sharedSolidAngle(const Falloff& falloff, const Vec3d& axis, const Cone& cone, int nodes);
+/// Nodes for a power, and for one up to a factor near 1, which still is 0 only where that is.
+inline constexpr int kFineNodes = 96, kRoughNodes = 8;
 
 }  // namespace photosphere::lights

@@ -81,12 +81,13 @@ class SoftSpot final : public Light {
   }
 
   /// As if a point sent what the ball does, a part of it past the sphere.
-  double roughPower(const BoundingSphere& bounds) const override {
+  Rgb roughPower(const BoundingSphere& bounds) const override {
     const double size = bounds.radius + m_radius;
     const bool apart = glm::length(bounds.center - m_center) > size;
     const double part = apart ? bounds.radius / size : std::min(1.0, bounds.radius / m_radius);
-    return std::max(0.0, maxComponent(Vec3d(m_intensity))) * part * part *
-           sharedSolidAngle(m_falloff, m_axis, reachOf(bounds), kRoughNodes);
+    return m_intensity *
+           static_cast<float>(part * part *
+                              sharedSolidAngle(m_falloff, m_axis, reachOf(bounds), kRoughNodes));
   }
 
   /// Its solid angle is at most that of a disc at the ball's nearest point.

@@ -13,15 +13,9 @@ class SpotLight final : public Light {
   SpotLight(const Vec3d& position, const Vec3d& axis, const Rgb& intensity, const Falloff& falloff)
       : m_source(position, intensity), m_axis(axis), m_falloff(falloff) {}
 
-  Rgb power(const BoundingSphere& bounds) const override {
-    return m_source.intensity() * static_cast<float>(sharedSolidAngle(
-                                      m_falloff, m_axis, coneToward(m_source.position(), bounds)));
-  }
-
-  double roughPower(const BoundingSphere& bounds) const override {
-    return std::max(0.0, maxComponent(Vec3d(m_source.intensity()))) *
-           sharedSolidAngle(m_falloff, m_axis, coneToward(m_source.position(), bounds),
-                            kRoughNodes);
+  Rgb power(const BoundingSphere& bounds) const override { return powerBy(bounds, kFineNodes); }
+  Rgb roughPower(const BoundingSphere& bounds) const override {
+    return powerBy(bounds, kRoughNodes);
   }
 
   Reach reach(const BoundingSphere& bounds) const override {
@@ -57,6 +51,12 @@ class SpotLight final : public Light {
   bool isGrey() const override { return isGreyColor(m_source.intensity()); }
 
  private:
+  Rgb powerBy(const BoundingSphere& bounds, int nodes) const {
+    const Cone cone = coneToward(m_source.position(), bounds);
+    return m_source.intensity() *
+           static_cast<float>(sharedSolidAngle(m_falloff, m_axis, cone, nodes));
+  }
+
   PointSource m_source;  // intensity on the axis
   Vec3d m_axis;          // unit, along propagation
   Falloff m_falloff;

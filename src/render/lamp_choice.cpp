@@ -25,7 +25,7 @@ double powerToward(const lights::Light& lamp, const lights::BoundingSphere& arou
       return lamp.reach(around).fluence * back * back * kPi * around.radius * around.radius;
     }
   }
-  return lamp.roughPower(around);
+  return lights::largestPower(lamp.roughPower(around));
 }
 
 }  // namespace

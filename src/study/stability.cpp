@@ -75,6 +75,7 @@ class Table {
   std::vector<StabilityRow> run() {
     for (const StabilityCase& c : m_catalogue.cases) {
       if (!chosen(c) || (m_options.quick && !c.quick)) continue;
+      m_frames.clear();
       if (c.trace == "slab_radiance") {
         runSlabRadiance(c);
       } else if (!c.trace.empty()) {
@@ -259,9 +260,7 @@ class Table {
     append(sets, o.set);
     const SmokeSpec& smoke = o.ownSmoke ? o.smoke : c.smoke;
     const int lamps = o.kind == "same" ? 0 : c.lights;
-    std::string key =
-        fmt::format("{} {} of {}, crop {}, {} lamps in {} {}", o.kind, c.layer, c.allowInvalid,
-                    fmt::join(c.crop, " "), lamps, c.spread, smoke.key());
+    std::string key = fmt::format("{} {} lamps in {} {}", o.kind, lamps, c.spread, smoke.key());
     for (const std::string& set : sets)
       key += "\n" + set;
     const auto known = m_frames.find(key);
@@ -430,8 +429,7 @@ class Table {
   const std::function<void(const StabilityRow&)>& m_each;
   StabilityCatalogue m_catalogue;
   RunFolder m_folder;
-  // What frames are held against, by all that it follows from.
-  std::map<std::string, StabilityFrame> m_frames;
+  std::map<std::string, StabilityFrame> m_frames;  // of one case
   std::vector<StabilityRow> m_rows;
 };
 

@@ -40,7 +40,6 @@ TEST(Threads, RowsThatManyThreadsAddToLoseNothing) {
   constexpr std::size_t kRows = 3, kWide = 100;
   FixedSums sums;
   sums.sums.assign(kRows * kWide, 0);
-  const RowLocks locks;
   std::vector<std::thread> threads;
   for (int t = 0; t < 4; ++t)
     threads.emplace_back([&] {
@@ -48,7 +47,6 @@ TEST(Threads, RowsThatManyThreadsAddToLoseNothing) {
       for (std::size_t i = 0; i < kItems; ++i) {
         for (std::size_t k = 0; k < kWide; ++k)
           row[k] = k % 2 ? -static_cast<std::int64_t>(k) : static_cast<std::int64_t>(k);
-        const RowLocks::Hold hold = locks.hold(i % kRows);
         sums.addRow(i % kRows * kWide, row);
       }
     });

@@ -64,37 +64,8 @@ inline std::uint32_t roundingBits(RandomKey key, std::uint64_t photon, std::uint
   return static_cast<std::uint32_t>(depositHash(key, photon, flight, deposit) >> 32);
 }
 
-/// Locks of rows of sums: to hold one costs what adding one sum alone does, so rows of many sums
-/// are better added under a lock. Rows share locks; a thread holds one at a time, and not for long.
-class RowLocks {
- public:
-  class Hold {
-   public:
-    explicit Hold(std::atomic<bool>& taken) : m_taken(taken) {
-      for (int tries = 0; m_taken.exchange(true, std::memory_order_acquire); ++tries)
-        if (tries % 64 == 63) std::this_thread::yield();
-    }
-    ~Hold() { m_taken.store(false, std::memory_order_release); }
-    Hold(const Hold&) = delete;
-    Hold& operator=(const Hold&) = delete;
-
-   private:
-    std::atomic<bool>& m_taken;
-  };
-
-  /// Neighbours have locks far from each other, not to wait for one cache line.
-  Hold hold(std::size_t row) const {
-    return Hold(m_taken[(static_cast<std::uint64_t>(row) * 0x9e3779b97f4a7c15ull) >> kShift]);
-  }
-
- private:
-  static constexpr int kBits = 14, kShift = 64 - kBits;
-  std::unique_ptr<std::atomic<bool>[]> m_taken =
-      std::make_unique<std::atomic<bool>[]>(std::size_t{1} << kBits);
-};
-
-/// Integer sums and the worth of one unit. Many threads may add at once, either by `add` and
-/// `addSigned` or by `addRow`.
+/// Integer sums and the worth of one unit. Many threads may add at once, to one sum either by `add`
+/// and `addSigned` or by `addRow`.
 struct FixedSums {
   std::vector<std::int64_t> sums;
   double quantum = 1.0;
@@ -125,21 +96,35 @@ struct FixedSums {
     for (std::size_t i = 0; i < count; i += kLine)
       __builtin_prefetch(sums.data() + at + i, 1);
   }
-  /// Adds whole units to sums that lie one behind another, while no other thread adds to them.
+  /// Adds whole units to the row of sums that begins at `at`. Rows do not overlap. Their lock costs
+  /// what adding one sum alone does.
   void addRow(std::size_t at, std::span<const std::int64_t> whole) {
     std::int64_t* const row = sums.data() + at;
     std::uint64_t lost = 0;
+    std::atomic<bool>& taken = lockOf(at);
+    for (int tries = 0; taken.exchange(true, std::memory_order_acquire); ++tries)
+      if (tries % 64 == 63) std::this_thread::yield();
     for (std::size_t i = 0; i < whole.size(); ++i)
       lost += __builtin_add_overflow(row[i], whole[i], &row[i]) ? 1 : 0;
+    taken.store(false, std::memory_order_release);
     if (lost > 0) overflows.fetch_add(lost, std::memory_order_relaxed);
   }
 
  private:
   static constexpr double kMost = 4e18;
+  static constexpr int kLockBits = 14;
+
+  // Rows share locks. Neighbours have theirs far apart, not to wait for one cache line.
+  std::atomic<bool>& lockOf(std::size_t at) {
+    return m_locks[(static_cast<std::uint64_t>(at) * 0x9e3779b97f4a7c15ull) >> (64 - kLockBits)];
+  }
   void addWhole(std::size_t at, std::int64_t whole) {
     if (whole != 0 && !addChecked(sums[at], whole))
       overflows.fetch_add(1, std::memory_order_relaxed);
   }
+
+  std::unique_ptr<std::atomic<bool>[]> m_locks =
+      std::make_unique<std::atomic<bool>[]>(std::size_t{1} << kLockBits);
 };
 
 }  // namespace photosphere

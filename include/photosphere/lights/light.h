@@ -75,11 +75,9 @@ class Light {
   /// Power that reaches the bounding sphere when nothing is in the way [W], per channel: what
   /// photon emission draws from. Zero for a light that cannot reach it.
   virtual Rgb power(const BoundingSphere& bounds) const = 0;
-  /// The same of the largest channel, up to a factor near 1, at least 0 and 0 only where no light
-  /// gets: what a lamp is chosen by that is one of many, at many places.
-  virtual double roughPower(const BoundingSphere& bounds) const {
-    return std::max(0.0, maxComponent(Vec3d(power(bounds))));
-  }
+  /// The same up to a factor near 1, and 0 only where no light gets: what a lamp is chosen by that
+  /// is one of many, at many places [W].
+  virtual Rgb roughPower(const BoundingSphere& bounds) const { return power(bounds); }
   /// What a plan may rely on: fluence 0 says that no light reaches the sphere.
   virtual Reach reach(const BoundingSphere& bounds) const {
     (void)bounds;
@@ -115,9 +113,13 @@ class Light {
   std::string m_name;
 };
 
+/// The largest channel of a power [W]; at least 0.
+inline double largestPower(const Rgb& power) {
+  return std::max(0.0, maxComponent(Vec3d(power)));
+}
 /// Power that reaches a sphere when nothing is in the way, of the largest channel [W]; at least 0.
 inline double largestPower(const Light& light, const BoundingSphere& bounds) {
-  return std::max(0.0, maxComponent(Vec3d(light.power(bounds))));
+  return largestPower(light.power(bounds));
 }
 
 struct LightPlugin {
