@@ -63,7 +63,7 @@ PhaseReader::PhaseReader(const LightFieldLayout& layout, const transport::Medium
     return;
   }
   const sphere::ZonalTable smooth(moments);
-  const auto smoothed = [&smooth](const Vec3f& w, const Vec3f& wo) {
+  const auto smoothed = [smooth](const Vec3f& w, const Vec3f& wo) {
     return static_cast<double>(smooth(w, wo));
   };
   m_bins.push_back({1.0f, sphere::BinWeights(layout.binShares(), smoothed, smooth.meanCosine(),

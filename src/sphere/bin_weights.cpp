@@ -1,11 +1,14 @@
 #include "photosphere/sphere/bin_weights.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <thread>
+#include <utility>
+#include <vector>
 
 #include "cell_quadrature.h"
 #include "directions.h"
-#include "photosphere/core/parallel.h"
 #include "reconstruction.h"
 
 namespace photosphere::sphere {
@@ -20,88 +23,121 @@ int latticeFor(double width) {
   return std::clamp(static_cast<int>(std::ceil(9.0 / width)), 8, 160);
 }
 
+// Node k of a lattice of `edges` along its side. Row j holds the nodes i = 0 .. edges - j.
+std::size_t nodeIndex(int edges, int i, int j) {
+  return static_cast<std::size_t>(j * (edges + 1) - j * (j - 1) / 2 + i);
+}
+
 }  // namespace
+
+// What the nodes are computed of, and those that were.
+class BinWeights::Nodes {
+ public:
+  /// @param cells   on which the phase function is averaged
+  /// @param spread  share of each bin's light in each cell, [cell][bin]; none where cells are bins
+  Nodes(const Partition& cells, int bins, int edges, const Phase& phase, double meanCosine,
+        double width, std::vector<double> spread)
+      : m_cells(static_cast<std::size_t>(cells.size())),
+        m_bins(static_cast<std::size_t>(bins)),
+        m_edges(edges),
+        m_phase(phase),
+        m_side(meanCosine < 0 ? -1.0f : 1.0f),
+        m_quadrature(cells, width),
+        m_spread(std::move(spread)),
+        m_states(std::make_unique<std::atomic<State>[]>(count())),
+        m_weights(std::make_unique_for_overwrite<float[]>(count() * m_bins)) {}
+
+  const float* at(int i, int j) {
+    const std::size_t k = nodeIndex(m_edges, i, j);
+    if (m_states[k].load(std::memory_order_acquire) != State::ready) compute(k, i, j);
+    return &m_weights[k * m_bins];
+  }
+
+ private:
+  enum class State : char { none, written, ready };
+
+  std::size_t count() const { return nodeIndex(m_edges, 0, m_edges) + 1; }
+  void average(const Vec3f& direction, std::vector<float>& means) const;
+  void compute(std::size_t k, int i, int j);
+
+  std::size_t m_cells, m_bins;
+  int m_edges;
+  Phase m_phase;
+  float m_side;
+  CellQuadrature m_quadrature;
+  std::vector<double> m_spread;
+  std::unique_ptr<std::atomic<State>[]> m_states;
+  std::unique_ptr<float[]> m_weights;  // node after node, a weight for each bin
+};
+
+// The phase function's mean over every cell.
+void BinWeights::Nodes::average(const Vec3f& direction, std::vector<float>& means) const {
+  const std::size_t octant = m_cells / 8;
+  double sum = 0;
+  for (std::size_t cell = 0; cell < m_cells; ++cell) {
+    // A cell of another octant sees wo as its mirror image in octant 0 sees wo mirrored.
+    const Vec3f wo = mirroredInto(static_cast<int>(cell / octant), direction);
+    const double mean =
+        m_quadrature.mean(static_cast<int>(cell % octant), m_phase, wo, m_side * wo);
+    means[cell] = static_cast<float>(mean);
+    sum += mean;
+  }
+  // Quadrature leaves up to 1e-4: the histogram must not gain or lose energy by it.
+  sum *= 4 * kPi / static_cast<double>(m_cells);
+  if (sum > 0)
+    for (float& mean : means)
+      mean = static_cast<float>(static_cast<double>(mean) / sum);
+}
+
+// Threads that want the same node at once all compute it, and one writes it.
+void BinWeights::Nodes::compute(std::size_t k, int i, int j) {
+  std::vector<float> row(m_cells);
+  average(glm::normalize(Vec3d(i, j, m_edges - i - j)), row);
+  if (!m_spread.empty()) {
+    // Light in a bin is spread over the cells around it.
+    std::vector<double> sums(m_bins, 0.0);
+    for (std::size_t cell = 0; cell < m_cells; ++cell)
+      for (std::size_t bin = 0; bin < m_bins; ++bin)
+        sums[bin] += static_cast<double>(row[cell]) * m_spread[cell * m_bins + bin];
+    row.assign(sums.begin(), sums.end());
+  }
+  State expected = State::none;
+  if (m_states[k].compare_exchange_strong(expected, State::written, std::memory_order_relaxed)) {
+    for (std::size_t bin = 0; bin < m_bins; ++bin)
+      m_weights[k * m_bins + bin] = row[bin];
+    m_states[k].store(State::ready, std::memory_order_release);
+  } else {
+    while (m_states[k].load(std::memory_order_acquire) != State::ready)
+      std::this_thread::yield();
+  }
+}
 
 BinWeights::BinWeights(const BinShares& deposit, const Phase& phase, double meanCosine,
                        Reconstruction reconstruction)
     : m_partition(deposit.partition()) {
+  const double width = std::max(0.005, 1 - std::abs(meanCosine));
+  m_lattice = latticeFor(width);
+  const auto nodes = [&](const Partition& cells, std::vector<double> spread) {
+    return std::make_shared<Nodes>(cells, size(), m_lattice, phase, meanCosine, width,
+                                   std::move(spread));
+  };
   const bool even =
       deposit.deposit() == DirectionDeposit::nearest && reconstruction == Reconstruction::constant;
   if (even || size() > kMaxSmoothBins) {
-    tabulate(m_partition, phase, meanCosine);
+    m_nodes = nodes(m_partition, {});
     return;
   }
   const int rows = m_partition.rows();
   const Partition fine(rows * (rows <= 2 ? 3 : 2));
-  tabulate(fine, phase, meanCosine);
-  reduce(reconstruction == Reconstruction::smooth ? smoothReconstruction(deposit, fine)
-                                                  : depositReconstruction(deposit, fine),
-         static_cast<std::size_t>(fine.size()));
-}
-
-// Weights of fine cells become weights of bins: light in a bin is spread over the fine cells around
-// it.
-void BinWeights::reduce(const std::vector<double>& spread, std::size_t cells) {
-  const auto bins = static_cast<std::size_t>(size());
-  const std::size_t nodes = m_table.size() / cells;
-  std::vector<float> reduced(nodes * bins);
-  parallelFor(nodes, 8, [&](std::size_t begin, std::size_t end) {
-    std::vector<double> row(bins);
-    for (std::size_t k = begin; k < end; ++k) {
-      std::fill(row.begin(), row.end(), 0.0);
-      for (std::size_t i = 0; i < cells; ++i) {
-        const double w = static_cast<double>(m_table[k * cells + i]);
-        for (std::size_t j = 0; j < bins; ++j)
-          row[j] += w * spread[i * bins + j];
-      }
-      for (std::size_t j = 0; j < bins; ++j)
-        reduced[k * bins + j] = static_cast<float>(row[j]);
-    }
-  });
-  m_table = std::move(reduced);
-}
-
-void BinWeights::tabulate(const Partition& cellsOf, const Phase& phase, double meanCosine) {
-  const double width = std::max(0.005, 1 - std::abs(meanCosine));
-  const float side = meanCosine < 0 ? -1.0f : 1.0f;
-  m_lattice = latticeFor(width);
-  const std::size_t count = static_cast<std::size_t>(cellsOf.size());
-  const std::size_t cells = count / 8;
-  const std::size_t nodes = static_cast<std::size_t>((m_lattice + 1) * (m_lattice + 2) / 2);
-  m_table.resize(nodes * count);
-  const CellQuadrature quadrature(cellsOf, width);
-
-  std::vector<Vec3f> directions;
-  for (int j = 0; j <= m_lattice; ++j)
-    for (int i = 0; i + j <= m_lattice; ++i)
-      directions.emplace_back(glm::normalize(Vec3d(i, j, m_lattice - i - j)));
-  parallelFor(nodes, 8, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t k = begin; k < end; ++k) {
-      float* row = &m_table[k * count];
-      double sum = 0;
-      for (std::size_t bin = 0; bin < count; ++bin) {
-        // A cell of another octant sees wo as its mirror image in octant 0 sees wo mirrored.
-        const Vec3f wo = mirroredInto(static_cast<int>(bin / cells), directions[k]);
-        const double mean = quadrature.mean(static_cast<int>(bin % cells), phase, wo, side * wo);
-        row[bin] = static_cast<float>(mean);
-        sum += mean;
-      }
-      // Quadrature leaves up to 1e-4: the histogram must not gain or lose energy by it.
-      sum *= 4 * kPi / static_cast<double>(count);
-      if (sum > 0)
-        for (std::size_t bin = 0; bin < count; ++bin)
-          row[bin] = static_cast<float>(static_cast<double>(row[bin]) / sum);
-    }
-  });
+  m_nodes =
+      nodes(fine, reconstruction == Reconstruction::smooth ? smoothReconstruction(deposit, fine)
+                                                           : depositReconstruction(deposit, fine));
 }
 
 const float* BinWeights::node(int i, int j) const {
-  // Row j holds the nodes i = 0 .. m_lattice - j. Rounding may ask for one past the long edge, with
-  // a weight of about nothing.
+  // Rounding may ask for one past the long edge, with a weight of about nothing.
   j = std::min(j, m_lattice);
-  i = std::min(i, m_lattice - j);
-  const int index = j * (m_lattice + 1) - j * (j - 1) / 2 + i;
-  return &m_table[static_cast<std::size_t>(index) * static_cast<std::size_t>(size())];
+  return m_nodes->at(std::min(i, m_lattice - j), j);
 }
 
 void BinWeights::weights(const Vec3f& wo, float* out) const {

@@ -1,9 +1,10 @@
-// What threads share: sums, loops, limits. Small enough to run under the thread sanitizer, for
-// which this program is built from the core alone.
+// What threads share: sums, loops, limits, tables that are filled as they are read. Small enough to
+// run under the thread sanitizer, for which this program is built from core and sphere alone.
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <stdexcept>
@@ -13,6 +14,7 @@
 #include "photosphere/core/fixed_point.h"
 #include "photosphere/core/log.h"
 #include "photosphere/core/parallel.h"
+#include "photosphere/sphere/bin_weights.h"
 
 namespace photosphere {
 namespace {
@@ -114,6 +116,38 @@ TEST(Threads, AnExceptionInALoopReachesTheCaller) {
                  std::runtime_error);
     EXPECT_EQ(visits[kItems / 2], 1) << round;
     EXPECT_LE(*std::max_element(visits.begin(), visits.end()), 1) << round;
+  }
+}
+
+// Whoever asks for a direction first has its weights computed, and all read the same.
+TEST(Threads, WeightsThatManyThreadsAskForAreTheSame) {
+  const auto phase = [](const Vec3f& w, const Vec3f& wo) {
+    const double q = 1.25 - static_cast<double>(glm::dot(w, wo));
+    return 0.75 / (4 * kPi * q * std::sqrt(q));  // g = 1/2
+  };
+  const sphere::BinShares nearest{sphere::Partition(1)};
+  constexpr auto kSmooth = sphere::Reconstruction::smooth;
+  const auto read = [](const sphere::BinWeights& table, bool backwards) {
+    constexpr int kDirections = 60;
+    std::vector<float> all(kDirections * static_cast<std::size_t>(table.size()));
+    for (int i = 0; i < kDirections; ++i) {
+      const int k = backwards ? kDirections - 1 - i : i;
+      const Vec3f wo = glm::normalize(Vec3f(static_cast<float>(k), 20.0f, 35.0f));
+      table.weights(wo, &all[static_cast<std::size_t>(k * table.size())]);
+    }
+    return all;
+  };
+  const std::vector<float> alone = read({nearest, phase, 0.5, kSmooth}, false);
+  for (int round = 0; round < 20; ++round) {
+    const sphere::BinWeights table(nearest, phase, 0.5, kSmooth);
+    std::vector<std::vector<float>> found(4);
+    std::vector<std::thread> threads;
+    for (std::size_t t = 0; t < found.size(); ++t)
+      threads.emplace_back([&, t] { found[t] = read(table, t % 2 == 1); });
+    for (std::thread& thread : threads)
+      thread.join();
+    for (const std::vector<float>& weights : found)
+      ASSERT_EQ(weights, alone) << round;
   }
 }
 

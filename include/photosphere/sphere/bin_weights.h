@@ -3,7 +3,7 @@
 // in-scattered light (METHOD.md section 5.1).
 
 #include <functional>
-#include <vector>
+#include <memory>
 
 #include "photosphere/core/types.h"
 #include "photosphere/sphere/bin_shares.h"
@@ -21,16 +21,17 @@ enum class Reconstruction {
              ///< which is as good there
 };
 
-/// Table of W_j(wo) = integral of f(w, wo) b_j(w) dw [1/sr], the phase function averaged over the
-/// light of bin j (b_j, of unit integral), for every outgoing direction wo. The partition looks the
-/// same from every octant, so only first-octant wo are tabulated, on a triangular lattice whose
-/// spacing follows the width of the lobe; between its nodes W_j is linear. Every node is scaled to
-/// sum_j A W_j = 1 (quadrature leaves below 1e-4), which linear interpolation keeps. Immutable;
-/// thread-safe.
+/// W_j(wo) = integral of f(w, wo) b_j(w) dw [1/sr], the phase function averaged over the light of
+/// bin j (b_j, of unit integral), for every outgoing direction wo. The partition looks the same
+/// from every octant, so only first-octant wo are tabulated, on a triangular lattice whose spacing
+/// follows the width of the lobe; between its nodes W_j is linear. Every node is scaled to
+/// sum_j A W_j = 1 (quadrature leaves below 1e-4), which linear interpolation keeps. A node is
+/// computed when it is first asked for, as a camera asks for few of a sharp lobe's thousands; it
+/// depends on nothing else, so results do not either. Thread-safe; copies share what was computed.
 class BinWeights {
  public:
   /// Phase function [1/sr] of unit propagation directions. It must depend on the angle between them
-  /// alone and be safe to call from several threads.
+  /// alone, be safe to call from several threads and stay valid as long as the weights.
   using Phase = std::function<double(const Vec3f& w, const Vec3f& wo)>;
 
   /// @param meanCosine  g of the lobe: 1 - |g| sets the resolution of the quadrature and lattice,
@@ -51,13 +52,12 @@ class BinWeights {
   int latticeSize() const { return m_lattice; }
 
  private:
-  void tabulate(const Partition& cells, const Phase& phase, double meanCosine);
-  void reduce(const std::vector<double>& spread, std::size_t cells);
+  class Nodes;
   const float* node(int i, int j) const;
 
   Partition m_partition;
   int m_lattice = 1;
-  std::vector<float> m_table;  // node after node, size() weights each
+  std::shared_ptr<Nodes> m_nodes;
 };
 
 }  // namespace photosphere::sphere
