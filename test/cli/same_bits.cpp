@@ -11,8 +11,9 @@
 namespace photosphere::test {
 namespace {
 
-const std::string kScene =
-    litSmoke(48, 36, 30000, R"(phase = { type = "henyey_greenstein", g = 0.5 })") + R"([[light]]
+const std::string kScene = litSmoke(48, 36, kSanitized ? 3000 : 30000,
+                                    R"(phase = { type = "henyey_greenstein", g = 0.5 })") +
+                           R"([[light]]
 type = "sphere"
 position = [-3, 1, 2]
 radius = 0.5

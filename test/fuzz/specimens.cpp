@@ -302,13 +302,14 @@ void addPictures(std::vector<Specimen>& all) {
   for (const char* target : {"exr", "exr.scan"})
     all.push_back({target, "tiled", tiledExr()});
   all.push_back({"hdr", "runs", radiance()});
-  for (const auto& [format, compression] :
-       {std::pair("png", ""), std::pair("jpeg", ""), std::pair("tiff", "zip"),
-        std::pair("tiff", "lzw"), std::pair("bmp", ""), std::pair("targa", "")})
-    all.push_back(
-        {"picture", std::string(format) + (*compression ? "_" : "") + compression, {}, [=] {
-           return picture(format, compression);
-         }});
+  const auto addPicture = [&](const char* format, const char* compression) {
+    const std::string name = std::string(format) + (*compression ? "_" : "") + compression;
+    all.push_back({"picture", name, {}, [=] { return picture(format, compression); }});
+  };
+  for (const char* format : {"png", "jpeg", "bmp", "targa"})
+    addPicture(format, "");
+  for (const char* compression : {"zip", "lzw"})
+    addPicture("tiff", compression);
   all.push_back({"ocio", "curve", kColorConfig});
 }
 
