@@ -17,15 +17,15 @@ namespace {
 
 constexpr int kMaxSmoothBins = 512;
 
+// Scale on which a lobe varies at its peak [rad].
+double widthOf(double meanCosine) {
+  return std::max(0.005, 1 - std::abs(meanCosine));
+}
+
 // Lattice edges along an octant's side for a lobe: about five to the lobe's width. A wide lobe
 // needs a few for the cells' own size.
 int latticeFor(double width) {
   return std::clamp(static_cast<int>(std::ceil(9.0 / width)), 8, 160);
-}
-
-// Node k of a lattice of `edges` along its side. Row j holds the nodes i = 0 .. edges - j.
-std::size_t nodeIndex(int edges, int i, int j) {
-  return static_cast<std::size_t>(j * (edges + 1) - j * (j - 1) / 2 + i);
 }
 
 }  // namespace
@@ -35,20 +35,24 @@ class BinWeights::Nodes {
  public:
   /// @param cells   on which the phase function is averaged
   /// @param spread  share of each bin's light in each cell, [cell][bin]; none where cells are bins
-  Nodes(const Partition& cells, int bins, int edges, const Phase& phase, double meanCosine,
-        double width, std::vector<double> spread)
+  Nodes(const Partition& cells, int bins, const Phase& phase, double meanCosine,
+        std::vector<double> spread)
       : m_cells(static_cast<std::size_t>(cells.size())),
         m_bins(static_cast<std::size_t>(bins)),
-        m_edges(edges),
+        m_edges(latticeFor(widthOf(meanCosine))),
         m_phase(phase),
         m_side(meanCosine < 0 ? -1.0f : 1.0f),
-        m_quadrature(cells, width),
+        m_quadrature(cells, widthOf(meanCosine)),
         m_spread(std::move(spread)),
         m_states(std::make_unique<std::atomic<State>[]>(count())),
         m_weights(std::make_unique_for_overwrite<float[]>(count() * m_bins)) {}
 
+  int edges() const { return m_edges; }
+  /// The weights of node i of row j; of the nearest one past the lattice's ends.
   const float* at(int i, int j) {
-    const std::size_t k = nodeIndex(m_edges, i, j);
+    j = std::min(j, m_edges);
+    i = std::min(i, m_edges - j);
+    const std::size_t k = index(i, j);
     if (m_states[k].load(std::memory_order_acquire) != State::ready) compute(k, i, j);
     return &m_weights[k * m_bins];
   }
@@ -56,8 +60,12 @@ class BinWeights::Nodes {
  private:
   enum class State : char { none, written, ready };
 
-  std::size_t count() const { return nodeIndex(m_edges, 0, m_edges) + 1; }
-  void average(const Vec3f& direction, std::vector<float>& means) const;
+  // Row j holds the nodes i = 0 .. m_edges - j.
+  std::size_t index(int i, int j) const {
+    return static_cast<std::size_t>(j * (m_edges + 1) - j * (j - 1) / 2 + i);
+  }
+  std::size_t count() const { return index(0, m_edges) + 1; }
+  std::vector<float> average(const Vec3f& direction) const;
   void compute(std::size_t k, int i, int j);
 
   std::size_t m_cells, m_bins;
@@ -71,7 +79,8 @@ class BinWeights::Nodes {
 };
 
 // The phase function's mean over every cell.
-void BinWeights::Nodes::average(const Vec3f& direction, std::vector<float>& means) const {
+std::vector<float> BinWeights::Nodes::average(const Vec3f& direction) const {
+  std::vector<float> means(m_cells);
   const std::size_t octant = m_cells / 8;
   double sum = 0;
   for (std::size_t cell = 0; cell < m_cells; ++cell) {
@@ -87,12 +96,12 @@ void BinWeights::Nodes::average(const Vec3f& direction, std::vector<float>& mean
   if (sum > 0)
     for (float& mean : means)
       mean = static_cast<float>(static_cast<double>(mean) / sum);
+  return means;
 }
 
 // Threads that want the same node at once all compute it, and one writes it.
 void BinWeights::Nodes::compute(std::size_t k, int i, int j) {
-  std::vector<float> row(m_cells);
-  average(glm::normalize(Vec3d(i, j, m_edges - i - j)), row);
+  std::vector<float> row = average(glm::normalize(Vec3d(i, j, m_edges - i - j)));
   if (!m_spread.empty()) {
     // Light in a bin is spread over the cells around it.
     std::vector<double> sums(m_bins, 0.0);
@@ -115,11 +124,8 @@ void BinWeights::Nodes::compute(std::size_t k, int i, int j) {
 BinWeights::BinWeights(const BinShares& deposit, const Phase& phase, double meanCosine,
                        Reconstruction reconstruction)
     : m_partition(deposit.partition()) {
-  const double width = std::max(0.005, 1 - std::abs(meanCosine));
-  m_lattice = latticeFor(width);
   const auto nodes = [&](const Partition& cells, std::vector<double> spread) {
-    return std::make_shared<Nodes>(cells, size(), m_lattice, phase, meanCosine, width,
-                                   std::move(spread));
+    return std::make_shared<Nodes>(cells, size(), phase, meanCosine, std::move(spread));
   };
   const bool even =
       deposit.deposit() == DirectionDeposit::nearest && reconstruction == Reconstruction::constant;
@@ -134,23 +140,22 @@ BinWeights::BinWeights(const BinShares& deposit, const Phase& phase, double mean
                                                            : depositReconstruction(deposit, fine));
 }
 
-const float* BinWeights::node(int i, int j) const {
-  // Rounding may ask for one past the long edge, with a weight of about nothing.
-  j = std::min(j, m_lattice);
-  return m_nodes->at(std::min(i, m_lattice - j), j);
+int BinWeights::latticeSize() const {
+  return m_nodes->edges();
 }
 
 void BinWeights::weights(const Vec3f& wo, float* out) const {
   const Vec3f a = glm::abs(wo);
   const float sum = a.x + a.y + a.z;
-  const float scale = sum > 0 ? static_cast<float>(m_lattice) / sum : 0.0f;
+  const float scale = sum > 0 ? static_cast<float>(latticeSize()) / sum : 0.0f;
   const int i = static_cast<int>(a.x * scale), j = static_cast<int>(a.y * scale);
   const float fx = a.x * scale - static_cast<float>(i), fy = a.y * scale - static_cast<float>(j);
-  // The triangle of the lattice square: below or above its diagonal.
+  // The triangle of the lattice square: below or above its diagonal. Rounding may ask for a node
+  // past the long edge, with a weight of about nothing.
   const bool below = fx + fy <= 1;
-  const float* const p = below ? node(i, j) : node(i + 1, j + 1);
-  const float* const q = node(i + 1, j);
-  const float* const r = node(i, j + 1);
+  const float* const p = below ? m_nodes->at(i, j) : m_nodes->at(i + 1, j + 1);
+  const float* const q = m_nodes->at(i + 1, j);
+  const float* const r = m_nodes->at(i, j + 1);
   const float wq = below ? fx : 1 - fy;
   const float wr = below ? fy : 1 - fx;
   const float wp = 1 - wq - wr;

@@ -49,14 +49,12 @@ class BinWeights {
   /// counts as +z.
   void weights(const Vec3f& wo, float* out) const;
   /// Edges of the lattice along one side of the octant.
-  int latticeSize() const { return m_lattice; }
+  int latticeSize() const;
 
  private:
   class Nodes;
-  const float* node(int i, int j) const;
 
   Partition m_partition;
-  int m_lattice = 1;
   std::shared_ptr<Nodes> m_nodes;
 };
 
