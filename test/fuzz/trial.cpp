@@ -7,6 +7,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <fstream>
 #include <new>
 
 #include "allocation_limit.h"
@@ -71,11 +72,36 @@ struct Shared {
   Outcomes outcomes;
 };
 
+constexpr rlim_t kMostMemory = rlim_t(2) << 30;
+
 void limitMemoryAndTime() {
-  const struct rlimit memory { rlim_t(2) << 30, rlim_t(2) << 30 }, cpu{60, 62}, core{0, 0};
+  const struct rlimit memory { kMostMemory, kMostMemory }, cpu{60, 62}, core{0, 0};
   if (!test::kSanitized) setrlimit(RLIMIT_AS, &memory);  // a sanitizer reserves terabytes
   setrlimit(RLIMIT_CPU, &cpu);
   setrlimit(RLIMIT_CORE, &core);
+}
+
+/// Memory that a process and those that it began hold [pages].
+rlim_t residentPages(pid_t process) {
+  const fs::path folder = fs::path("/proc") / std::to_string(process);
+  rlim_t all = 0, resident = 0;
+  std::ifstream(folder / "statm") >> all >> resident;
+  std::ifstream children(folder / "task" / std::to_string(process) / "children");
+  for (pid_t child = 0; children >> child;)
+    resident += residentPages(child);
+  return resident;
+}
+
+/// Waits for a process that leads a group. Where no limit keeps the group from taking all the
+/// memory of the machine, this does. @return its status
+int waitFor(pid_t leader) {
+  const rlim_t most = kMostMemory / static_cast<rlim_t>(sysconf(_SC_PAGESIZE));
+  int status = 0;
+  while (waitpid(leader, &status, test::kSanitized ? WNOHANG : 0) == 0) {
+    if (residentPages(leader) > most) kill(-leader, SIGKILL);
+    usleep(2000);
+  }
+  return status;
 }
 
 /// Gives inputs from `shared.next` to `end` in a process of its own. @return how that ended
@@ -86,6 +112,7 @@ int giveInChild(const Target& target, std::size_t end,
   const pid_t child = fork();
   if (child < 0) return -1;
   if (child == 0) {
+    if (test::kSanitized) setpgid(0, 0);
     limitMemoryAndTime();
     dup2(open(report.c_str(), O_CREAT | O_TRUNC | O_WRONLY, 0600), STDERR_FILENO);
     for (; shared.next < end; ++shared.next) {
@@ -97,8 +124,7 @@ int giveInChild(const Target& target, std::size_t end,
     }
     _exit(0);
   }
-  int status = 0;
-  waitpid(child, &status, 0);
+  const int status = waitFor(child);
   return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
 }
 
