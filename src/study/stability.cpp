@@ -29,7 +29,7 @@ using Sets = std::vector<std::string>;
 
 constexpr double kCpuLimit = 120, kQuickCpuLimit = 30;  // seconds a run
 constexpr int kFiner = 10;
-constexpr int kQuickShare = 8;  // of the small size: paths held against are so many times fewer
+constexpr int kQuickShare = 24;  // of the small size: paths held against are so many times fewer
 
 void append(Sets& to, const Sets& more) {
   to.insert(to.end(), more.begin(), more.end());

@@ -42,9 +42,9 @@ inline void writeSmokeFrames(const TemporaryFolder& folder, int last) {
 }
 
 /// A scene of those frames, lit by one lamp.
-/// @param volume  more keys of the smoke, a line each
+/// @param volume, estimator  more keys of them, a line each
 inline std::string litSmoke(int width, int height, int photons = 2000,
-                            const std::string& volume = {}) {
+                            const std::string& volume = {}, const std::string& estimator = {}) {
   return fmt::format(R"([scene]
 seed_per_frame = false
 [camera]
@@ -54,6 +54,7 @@ fov = 30
 resolution = [{}, {}]
 [estimator]
 photons = {}
+{}
 [[volume]]
 file = "smoke.####.vdb"
 density_scale = 4
@@ -63,7 +64,7 @@ type = "point"
 position = [3, 3, 2]
 intensity = 50
 )",
-                     width, height, photons, volume);
+                     width, height, photons, estimator, volume);
 }
 
 /// The first channel in which two pictures differ by any bit; empty where they are the same.

@@ -61,7 +61,7 @@ TEST(AreaLights, AgreeWithPathTracing) {
     TestScene scene = plumeScene(0.5, 64, 48);
     scene.lights.clear();
     scene.lights.push_back(makeLight(row.type, row.options));
-    const Truth truth = pathTruth(scene, 192);
+    const Truth truth = pathTruth(scene, 96);
     LightFieldLayout layout;
     layout.channels = 1;
     layout.unscattered = true;
@@ -79,8 +79,8 @@ TEST(AreaLights, AgreeWithPathTracing) {
       EXPECT_NEAR(multiple.meanRatio, 1, mean) << row.type << ", " << way;
       EXPECT_LT(multiple.relMse, 0.1) << row.type << ", " << way;
     };
-    check("photosphere", renderPhotosphere(scene, layout, 400'000, 5).layers, 0.035);
-    check("photon map", renderPhotonMap(scene, map, 400'000, 5).layers, 0.06);
+    check("photosphere", renderPhotosphere(scene, layout, 200'000, 5).layers, 0.035);
+    check("photon map", renderPhotonMap(scene, map, 200'000, 5).layers, 0.06);
   }
 }
 

@@ -52,14 +52,14 @@ void expectAgreement(const std::string& name, const TestScene& scene, int channe
   check("view", renderPhotosphere(scene, layout, 300'000, 5).layers, 1);
   layout.basis = Basis::histogram;
   layout.rows = 4;
-  check("128 bins", renderPhotosphere(scene, layout, 300'000, 5).layers, 1.5);
+  check("128 bins", renderPhotosphere(scene, layout, 150'000, 5).layers, 1.5);
   // Gathering asks toward any direction.
   layout.evaluate = Evaluate::perStep;
-  check("final gathering", renderPhotosphere(scene, layout, 300'000, 5, 4, 16).layers, 2);
+  check("final gathering", renderPhotosphere(scene, layout, 150'000, 5, 4, 16).layers, 2);
   PhotonMapLayout map;
   map.channels = channels;
   map.radius = 0.03;
-  check("photon map", renderPhotonMap(scene, map, 300'000, 5).layers, 4);
+  check("photon map", renderPhotonMap(scene, map, 150'000, 5).layers, 4);
 }
 
 TEST(ColouredSmoke, AgreesWithPathTracing) {

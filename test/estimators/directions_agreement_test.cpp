@@ -111,14 +111,14 @@ TEST(DirectionOptions, AgreeWithPathTracingOnThePlume) {
   if (kSanitized) GTEST_SKIP() << "a mean of many paths, too slow under a sanitizer";
   TestScene scene = plumeScene(0.7, 64, kPixels);
   scene.particles = seedParticles(*scene.medium, 15000);
-  const Truth truth = pathTruth(scene, 768);
+  const Truth truth = pathTruth(scene, 384);
   for (const Row& row : kRows) {
     LightFieldLayout layout;
     layout.basis = Basis::histogram;
     layout.channels = 1;
     row.set(layout);
     checkLayout(layout);
-    const std::uint64_t photons = layout.carrier == Carrier::voxels ? 200'000 : 60'000;
+    const std::uint64_t photons = layout.carrier == Carrier::voxels ? 100'000 : 40'000;
     const PhotosphereFrame frame = renderPhotosphere(scene, layout, photons, 5);
     EXPECT_EQ(frame.layers.nanSamples + frame.layers.negativeSamples, 0u) << row.name;
     const LayerError error = truth.errorOf(frame.layers, &render::FrameLayers::multiple);

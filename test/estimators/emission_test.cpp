@@ -17,7 +17,7 @@ using estimators::Carrier;
 using estimators::LightFieldLayout;
 
 constexpr int kPixels = 64;
-constexpr std::uint64_t kPhotons = kSanitized ? 5'000 : 500'000;
+constexpr std::uint64_t kPhotons = kSanitized ? 5'000 : 250'000;
 
 struct CarrierCase {
   Carrier carrier;
@@ -54,7 +54,7 @@ TestScene burningPlume(double g) {
 
 TEST_P(Glow, AgreesWithPathTracing) {
   const TestScene scene = burningPlume(0.6);
-  static const Truth truth = pathTruth(scene, kSanitized ? 2 : 128);
+  static const Truth truth = pathTruth(scene, kSanitized ? 2 : 64);
   const PhotosphereFrame frame = renderPhotosphere(scene, layout(3), kPhotons, 5);
   EXPECT_EQ(frame.layers.nanSamples + frame.layers.negativeSamples, 0u);
   EXPECT_GT(frame.statistics.born, frame.statistics.photons / 10);
@@ -89,7 +89,7 @@ TEST_P(Glow, ThermalFurnaceIsOneEverywhere) {
     scene.particles = seedParticles(*scene.medium, 60'000);
     LightFieldLayout l = layout(1);
     l.unscattered = true;
-    const PhotosphereFrame frame = renderPhotosphere(scene, l, kPhotons, 5);
+    const PhotosphereFrame frame = renderPhotosphere(scene, l, 2 * kPhotons, 5);
     const BlockDeviation off = deviationFromOne(frame.layers.beauty, kPixels, 8);
     std::printf("  albedo %.1f: mean %.5f, worst block off by %.4f\n", albedo, off.mean, off.worst);
     if (kSanitized) continue;

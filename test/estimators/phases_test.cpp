@@ -56,17 +56,17 @@ TEST(Phases, AgreeWithPathTracing) {
     layout.rows = 2;
     layout.representative = Representative::mean;
     expectClose(row, "32 mean directions",
-                error(renderPhotosphere(scene, layout, 200'000, 5).layers), 0.15, 0.1);
+                error(renderPhotosphere(scene, layout, 100'000, 5).layers), 0.15, 0.1);
     LightFieldLayout harmonics;
     harmonics.channels = 1;
     harmonics.basis = Basis::sphericalHarmonics;
     harmonics.order = 8;
     expectClose(row, "harmonics of order 8",
-                error(renderPhotosphere(scene, harmonics, 200'000, 5).layers), 0.05, 0.05);
+                error(renderPhotosphere(scene, harmonics, 100'000, 5).layers), 0.05, 0.05);
     PhotonMapLayout map;
     map.channels = 1;
     map.radius = 0.03;
-    expectClose(row, "photon map", error(renderPhotonMap(scene, map, 200'000, 5).layers), 0.1, 0.1);
+    expectClose(row, "photon map", error(renderPhotonMap(scene, map, 100'000, 5).layers), 0.1, 0.1);
   }
 }
 

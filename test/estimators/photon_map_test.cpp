@@ -43,7 +43,7 @@ const Judged& judged(const std::string& name) {
   if (found != cache.end()) return found->second;
   Judged j;
   j.scene = name == "sphere" ? sphereScene(6, 0.9, 0.4, 32, kPixels) : plumeScene(0.7, 64, kPixels);
-  j.truth = pathTruth(j.scene, kSanitized ? 2 : 768);
+  j.truth = pathTruth(j.scene, kSanitized ? 2 : 256);
   return cache.emplace(name, std::move(j)).first->second;
 }
 

@@ -20,14 +20,14 @@ using namespace estimators;
 TEST(FluenceSmoothing, DensityGainsWhatPlainLosesAndTheOthersAreBetween) {
   if (kSanitized) GTEST_SKIP() << "a mean of many paths, too slow under a sanitizer";
   const TestScene scene = sphereScene(8, 0.95, 0.5, 32, 48);
-  const Truth truth = pathTruth(scene, 256);
+  const Truth truth = pathTruth(scene, 128);
   std::map<Smoothing, LayerError> errors;
   for (const Named<Smoothing>& way : Names<Smoothing>::all) {
     LightFieldLayout layout;
     layout.channels = 1;
     layout.smoothing = way.value;
     layout.radius = 4 * layout.lightVoxel * scene.medium->voxelEdge();
-    const PhotosphereFrame frame = renderPhotosphere(scene, layout, 400'000, 5);
+    const PhotosphereFrame frame = renderPhotosphere(scene, layout, 200'000, 5);
     const LayerError e = truth.errorOf(frame.layers, &render::FrameLayers::multiple);
     std::printf("  %-8s mean %.4f  relMSE %.5f\n", std::string(way.name).c_str(), e.meanRatio,
                 e.relMse);
@@ -106,12 +106,12 @@ void expectTheMeanOfMany(double g, Basis basis, int frames, std::uint64_t many, 
 }
 
 TEST(FluenceSmoothing, FewPhotonsHaveTheMeanOfMany) {
-  expectTheMeanOfMany(0.7, Basis::view, 48, 3'000'000, 0.03);
+  expectTheMeanOfMany(0.7, Basis::view, 32, 1'000'000, 0.03);
 }
 
 // A bin's light that is read beside a needle is below zero, and made up for by its neighbours'.
 TEST(FluenceSmoothing, FewPhotonsInBinsHaveTheMeanOfMany) {
-  expectTheMeanOfMany(0.95, Basis::histogram, 16, 1'000'000, 0.05);
+  expectTheMeanOfMany(0.95, Basis::histogram, 20, 700'000, 0.05);
 }
 
 std::vector<Vec3f> pointsInBall(int count) {
@@ -131,12 +131,12 @@ TEST_P(OpaqueVoxels, KeepWhatIsSeenOfThem) {
   if (kSanitized) GTEST_SKIP() << "a mean of many paths, too slow under a sanitizer";
   TestScene scene = sphereScene(GetParam(), 0.95, 0.0, 16, 32);
   scene.particles = pointsInBall(20'000);
-  const Truth truth = pathTruth(scene, 100);
+  const Truth truth = pathTruth(scene, 64);
   const auto meanOf = [&](LightFieldLayout layout, Smoothing way) {
     layout.channels = 1;
     layout.smoothing = way;
     layout.radius = 0.5 * layout.lightVoxel * scene.medium->voxelEdge();
-    const PhotosphereFrame frame = renderPhotosphere(scene, layout, 100'000, 5);
+    const PhotosphereFrame frame = renderPhotosphere(scene, layout, 40'000, 5);
     const LayerError e = truth.errorOf(frame.layers, &render::FrameLayers::multiple);
     std::printf(
         "  %s %s %s %-8s mean %.4f  relMSE %.5f\n", std::string(nameOf(layout.basis)).c_str(),

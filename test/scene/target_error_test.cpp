@@ -185,7 +185,7 @@ class TargetError : public ::testing::Test {
 // What each estimator says of itself against path tracing with sixty times the samples.
 TEST_F(TargetError, TheEstimateIsTheErrorThatThereIs) {
   if (kSanitized) GTEST_SKIP() << "a truth of many paths, too slow under a sanitizer";
-  const FrameResult truth = render({"estimator.type=path_traced", "estimator.samples=2000"});
+  const FrameResult truth = render({"estimator.type=path_traced", "estimator.samples=1000"});
   const std::vector<std::string> ways[] = {
       {"estimator.type=path_traced", "estimator.samples=32"},
       {"estimator.type=light_traced", "estimator.samples=32"},
@@ -219,7 +219,7 @@ TEST_F(TargetError, OfACropIsThatOfItsPixels) {
     const auto with = [&](const std::vector<std::string>& sets) {
       return renderScene(scene(sets), 1, request);
     };
-    const FrameResult truth = with({"estimator.type=path_traced", "estimator.samples=5000"});
+    const FrameResult truth = with({"estimator.type=path_traced", "estimator.samples=2500"});
     for (std::vector<std::string> sets :
          {std::vector<std::string>{"estimator.type=path_traced", "estimator.samples=32"},
           {"estimator.type=light_traced", "estimator.samples=32"},
@@ -261,8 +261,9 @@ TEST_F(TargetError, GoesOnUntilItIsMet) {
 }
 
 TEST_F(TargetError, EveryBatchHasPhotonsOfItsOwn) {
-  const FrameResult plain = render({"estimator.photons=8000"});
-  const FrameResult r = render({"estimator.photons=8000", "render.target_error=10"});
+  const FrameResult plain = render({"estimator.photons=8000", "estimator.light_voxel=1"});
+  const FrameResult r =
+      render({"estimator.photons=8000", "estimator.light_voxel=1", "render.target_error=10"});
   EXPECT_EQ(r.statistics.photonsEmitted, 8000u);
   EXPECT_EQ(r.statistics.batches, 8);
   EXPECT_GT(r.statistics.error->noise, 0.0);
@@ -300,7 +301,7 @@ TEST_F(TargetError, TimeEndsItAfterThePartAtHand) {
 TEST_F(TargetError, ThreadsDoNotChangeOneBit) {
   const auto with = [&](unsigned threads) {
     const ThreadLimit limit(threads);
-    return render({"estimator.photons=4000",
+    return render({"estimator.photons=4000", "estimator.light_voxel=1",
                    std::string("render.target_error=") + (kSanitized ? "2" : "0.2")});
   };
   const FrameResult one = with(1), three = with(3);

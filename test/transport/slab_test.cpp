@@ -80,7 +80,7 @@ TEST_P(Slab, ReflectanceAndTransmittance) {
   LeaveCounter sink;
   transport::TraceOptions options;
   // Through the deepest a photon scatters a thousand times.
-  options.photons = kSanitized ? 20'000 : c.tau > 16 ? 400'000 : 1'000'000;
+  options.photons = kSanitized ? 20'000 : c.tau > 16 ? 150'000 : 500'000;
   options.key = RandomKey::fromSeed(7, 0);
   const transport::TraceStatistics stats = tracePhotons(medium, lights, options, sink);
   EXPECT_EQ(stats.majorantViolations, 0u);
