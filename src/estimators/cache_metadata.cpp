@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cmath>
 
+#include "photosphere/core/checksums.h"
 #include "photosphere/core/version.h"
 #include "photosphere/sphere/spherical_harmonics.h"
 
@@ -64,6 +65,23 @@ void MetadataReader::bad(const std::string& key) const {
   throw InputError(
       m_path, fmt::format("metadata '{}' holds '{}', which no trace writes; trace it again", key,
                           text(key)));
+}
+
+std::string sealed(const char* format, const std::string& checksum) {
+  return fmt::format("{}, checksum {}", format, checksum);
+}
+
+void checkFormat(const MetadataReader& m, const char* format) {
+  const std::string& found = m.text("photosphere_format");
+  if (found != format && !found.starts_with(sealed(format, ""))) m.bad("photosphere_format");
+}
+
+void checkSeal(const MetadataReader& m, const char* format, const std::string& checksum) {
+  const std::string& found = m.text("photosphere_format");
+  if (kChecksums && found != format && found != sealed(format, checksum))
+    throw InputError(m.path(),
+                     "is damaged: what it holds has another checksum than what was written; trace "
+                     "it again");
 }
 
 void describeLayout(const LightFieldLayout& l, const LightCacheKey& key, Metadata& m) {

@@ -52,6 +52,22 @@ void addSet(volume::ParticleSet& points, const LightField& field, std::size_t se
     points.add({fmt::format("photon_direction{}", suffix), 3 * l.bins(), std::move(directions)});
 }
 
+Metadata describe(const LightField& field, const LightCacheKey& key) {
+  Metadata m;
+  describeLayout(field.layout, key, m);
+  if (field.layout.carrier == Carrier::voxels) describeLattice(field.lattice, m);
+  m["photons"] = std::to_string(field.photons);
+  m["far_photons"] = std::to_string(field.farPhotons);
+  m["carriers"] = std::to_string(field.carriers());
+  return m;
+}
+
+std::string checksum(const LightField& field, const Metadata& metadata) {
+  const bool voxels = field.layout.carrier == Carrier::voxels;
+  return checksumOf(metadata, field, field.values, voxels ? &field.lattice : nullptr,
+                    voxels ? nullptr : &field.particles);
+}
+
 }  // namespace
 
 void writeLightCache(const std::filesystem::path& path, const LightField& field,
@@ -66,13 +82,8 @@ void writeLightCache(const std::filesystem::path& path, const LightField& field,
   addSet(points, field, 0, "");
   if (field.layout.unscattered) addSet(points, field, 1, "_unscattered");
   if (field.weights) points.add({kWeightsName, 1, *field.weights});
-  Metadata& m = points.metadata;
-  describeLayout(field.layout, key, m);
-  if (voxels) describeLattice(field.lattice, m);
-  m["photosphere_format"] = kFormat;
-  m["photons"] = std::to_string(field.photons);
-  m["far_photons"] = std::to_string(field.farPhotons);
-  m["carriers"] = std::to_string(field.carriers());
+  points.metadata = describe(field, key);
+  points.metadata["photosphere_format"] = sealed(kFormat, checksum(field, points.metadata));
   // Light voxels sit alone in their point voxel; particles are binned by default.
   const double voxelSize = voxels ? field.lattice.edge() / key.space.metersPerUnit : 0.0;
   volume::writeVdb(path, {volume::pointsToGrid(points, kGridName, voxelSize)});
@@ -90,7 +101,7 @@ LightField readLightCache(const std::filesystem::path& path, const LightCacheKey
                            "with `photosphere trace SCENE -o LIGHT.vdb`)");
   const volume::ParticleSet points = volume::gridToPoints(*grid);
   const MetadataReader m(path.string(), points.metadata);
-  if (m.text("photosphere_format") != kFormat) m.bad("photosphere_format");
+  checkFormat(m, kFormat);
   if (!allowStale)
     for (const auto& [key, now] :
          {std::pair<std::string, std::string>{"medium_hash", expected.mediumHash},
@@ -141,6 +152,7 @@ LightField readLightCache(const std::filesystem::path& path, const LightCacheKey
   else
     field.lattice = readLattice(m, points, order);
   if (weighted) field.weights = readWeights(m.path(), points, order);
+  checkSeal(m, kFormat, checksum(field, describe(field, readKey(m))));
   return field;
 }
 

@@ -47,7 +47,6 @@ Metadata describe(const LightShard& shard) {
   const LightSums& light = shard.light;
   Metadata m;
   describeLayout(light.layout, shard.key, m);
-  m["photosphere_format"] = kFormat;
   m["shard"] = std::to_string(shard.number.index);
   m["shards"] = std::to_string(shard.number.count);
   m["photons"] = std::to_string(light.photons);
@@ -64,6 +63,14 @@ Metadata describe(const LightShard& shard) {
     m[power.name] = exact(shard.statistics.*power.member);
   if (!light.layout.holdsPower()) describeLattice(light.lattice, m);
   return m;
+}
+
+std::string checksum(const LightShard& shard) {
+  const LightSums& light = shard.light;
+  const bool onParticles = light.layout.carrier == Carrier::particles;
+  return checksumOf(describe(shard), light, light.sums,
+                    light.layout.holdsPower() ? nullptr : &light.lattice,
+                    onParticles ? &light.particles : nullptr);
 }
 
 const volume::Grid& pointGrid(const volume::VdbFile& file, const char* name,
@@ -143,6 +150,7 @@ void writeLightShard(const std::filesystem::path& path, const LightShard& shard)
   points.add({"photon_sums", light.layout.valuesPerCarrier(), light.sums});
   if (light.weights) points.add({kWeightsName, 1, *light.weights});
   points.metadata = describe(shard);
+  points.metadata["photosphere_format"] = sealed(kFormat, checksum(shard));
   const double voxelSize = voxels ? light.lattice.edge() / shard.key.space.metersPerUnit : 0.0;
   std::vector<volume::Grid> grids{volume::pointsToGrid(points, kGridName, voxelSize)};
   if (voxels && light.layout.carrier == Carrier::particles)
@@ -156,7 +164,7 @@ LightShard readLightShard(const std::filesystem::path& path) {
   const volume::ParticleSet points =
       volume::gridToPoints(pointGrid(file, kGridName, path.string()));
   const MetadataReader m(path.string(), points.metadata);
-  if (m.text("photosphere_format") != kFormat) m.bad("photosphere_format");
+  checkFormat(m, kFormat);
   LightShard shard = readHead(m);
   LightSums& light = shard.light;
   if (m.count("places") != points.size()) m.bad("places");
@@ -164,16 +172,17 @@ LightShard readLightShard(const std::filesystem::path& path) {
   readSums(m, points, order, light);
   if (light.layout.holdsPower()) {
     light.particles = readLocal(path.string(), points, order);
-    return shard;
+  } else {
+    light.lattice = readLattice(m, points, order);
+    if (light.layout.smoothing == Smoothing::visible)
+      light.weights = readWeights(path.string(), points, order);
+    if (light.layout.carrier == Carrier::particles) {
+      const volume::ParticleSet particles =
+          volume::gridToPoints(pointGrid(file, kParticlesName, path.string()));
+      light.particles = readLocal(path.string(), particles, readOrder(path.string(), particles));
+    }
   }
-  light.lattice = readLattice(m, points, order);
-  if (light.layout.smoothing == Smoothing::visible)
-    light.weights = readWeights(path.string(), points, order);
-  if (light.layout.carrier == Carrier::particles) {
-    const volume::ParticleSet particles =
-        volume::gridToPoints(pointGrid(file, kParticlesName, path.string()));
-    light.particles = readLocal(path.string(), particles, readOrder(path.string(), particles));
-  }
+  checkSeal(m, kFormat, checksum(shard));
   return shard;
 }
 

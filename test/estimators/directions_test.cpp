@@ -459,7 +459,8 @@ TEST(LightCache, HoldsEveryWayOfStoringDirections) {
     }
 }
 
-// Caches from before directions had a choice say nothing of it: nearest bins that keep no mean.
+// Caches from before directions had a choice say nothing of it, nor have they a checksum: nearest
+// bins that keep no mean.
 TEST(LightCache, OlderOnesStillRead) {
   const TestScene scene = sphereScene(8, 0.95, 0.5, 8, 16);
   const TemporaryFolder folder;
@@ -471,11 +472,51 @@ TEST(LightCache, OlderOnesStillRead) {
   volume::ParticleSet points = volume::gridToPoints(file.find("light"));
   EXPECT_EQ(points.metadata.erase("direction"), 1u);
   EXPECT_EQ(points.metadata.erase("representative"), 1u);
+  points.metadata["photosphere_format"] = "photosphere light cache 1";
   volume::writeVdb(path, {volume::pointsToGrid(points, "light", 0.0)});
   const LightField back = readLightCache(path, key, false);
   EXPECT_EQ(back.values, field.values);
   EXPECT_EQ(back.layout.direction, DirectionDeposit::nearest);
   EXPECT_EQ(back.layout.representative, Representative::bin);
+}
+
+// One value, one word of the metadata or one voxel that is not what it was.
+TEST(LightCache, DamageIsSeen) {
+  const TestScene scene = sphereScene(8, 0.95, 0.5, 8, 16);
+  const TemporaryFolder folder;
+  const LightField field = trace(scene, histogram(), 500);
+  const LightCacheKey key{"m", "l", {}};
+  const auto path = folder / "light.vdb";
+  writeLightCache(path, field, key);
+  const volume::VdbFile file = volume::readVdb(path.string());
+  const volume::ParticleSet whole = volume::gridToPoints(file.find("light"));
+  const auto complaint = [&](const std::function<void(volume::ParticleSet&)>& damage) {
+    volume::ParticleSet points = whole;
+    damage(points);
+    volume::writeVdb(path, {volume::pointsToGrid(points, "light", 0.0)});
+    try {
+      readLightCache(path, key, false);
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_EQ(complaint([](volume::ParticleSet&) {}), "");
+  const auto expectSeen = [&](const std::function<void(volume::ParticleSet&)>& damage) {
+    const std::string what = complaint(damage);
+    EXPECT_NE(what.find("is damaged"), std::string::npos) << what;
+    EXPECT_NE(what.find("trace it again"), std::string::npos) << what;
+  };
+  expectSeen([](volume::ParticleSet& points) {
+    auto& values = std::get<std::vector<float>>(points.find("photon_histogram")->data);
+    values.back() = std::nextafter(values.back(), 1e9f);
+  });
+  expectSeen([](volume::ParticleSet& points) { points.metadata["photons"] = "501"; });
+  expectSeen([](volume::ParticleSet& points) { points.metadata["radius_m"] = "0.25"; });
+  // Two voxels change places.
+  expectSeen([](volume::ParticleSet& points) {
+    std::swap(points.positions.front(), points.positions.back());
+  });
 }
 
 }  // namespace
