@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "photosphere/core/checksums.h"
+#include "photosphere/core/hash.h"
 #include "photosphere/core/version.h"
 #include "photosphere/sphere/spherical_harmonics.h"
 
@@ -65,6 +66,26 @@ void MetadataReader::bad(const std::string& key) const {
   throw InputError(
       m_path, fmt::format("metadata '{}' holds '{}', which no trace writes; trace it again", key,
                           text(key)));
+}
+
+std::string checksumOf(Metadata metadata, const Contents& contents) {
+  Hasher hash;
+  metadata.erase("photosphere_format");
+  metadata.erase("photosphere_version");
+  for (const auto& [key, value] : metadata) {
+    hash.text(key);
+    hash.text(value);
+  }
+  for (std::size_t i = 0; contents.lattice && i < contents.lattice->size(); ++i) {
+    const Vec3i voxel = contents.lattice->voxel(i);
+    hash.numbers(&voxel.x, 3);
+  }
+  if (contents.particles)
+    for (const Vec3f& particle : *contents.particles)
+      hash.numbers(&particle.x, 3);
+  if (contents.weights) hash.numbers(contents.weights->data(), contents.weights->size());
+  hash.bytes(contents.values.data(), contents.values.size());
+  return hash.hex();
 }
 
 std::string sealed(const char* format, const std::string& checksum) {

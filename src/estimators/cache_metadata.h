@@ -1,12 +1,13 @@
 #pragma once
 // What light caches and shards say about themselves as grid metadata, and where their points lie.
 
+#include <cstddef>
 #include <map>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "photosphere/core/error.h"
-#include "photosphere/core/hash.h"
 #include "photosphere/estimators/layout_names.h"
 #include "photosphere/estimators/light_cache.h"
 #include "photosphere/volume/particle_set.h"
@@ -76,32 +77,15 @@ std::shared_ptr<const std::vector<float>> readWeights(const std::string& path,
                                                       const std::vector<std::int32_t>& order);
 inline constexpr const char* kWeightsName = "photon_weight";
 
-/// Checksum of a light cache or shard: of its metadata but format and version, and of all that its
-/// points say.
-/// @param light               LightField or LightSums
-/// @param lattice, particles  of it; nullptr = not in the file
-template <class Light, class Value>
-std::string checksumOf(Metadata metadata, const Light& light, const std::vector<Value>& values,
-                       const transport::SupportLattice* lattice,
-                       const std::vector<Vec3f>* particles) {
-  Hasher hash;
-  metadata.erase("photosphere_format");
-  metadata.erase("photosphere_version");
-  for (const auto& [key, value] : metadata) {
-    hash.text(key);
-    hash.text(value);
-  }
-  for (std::size_t i = 0; lattice && i < lattice->size(); ++i) {
-    const Vec3i voxel = lattice->voxel(i);
-    hash.numbers(&voxel.x, 3);
-  }
-  for (std::size_t i = 0; particles && i < particles->size(); ++i)
-    hash.numbers(&(*particles)[i].x, 3);
-  if (light.layout.smoothing == Smoothing::visible && light.weights)
-    hash.numbers(light.weights->data(), light.weights->size());
-  hash.numbers(values.data(), values.size());
-  return hash.hex();
-}
+/// What the points of a light cache or shard say; nullptr = not in the file.
+struct Contents {
+  const transport::SupportLattice* lattice;
+  const std::vector<Vec3f>* particles;
+  const std::vector<float>* weights;
+  std::span<const std::byte> values;
+};
+/// Checksum of metadata, but of format and version, and of contents.
+std::string checksumOf(Metadata metadata, const Contents& contents);
 /// What `photosphere_format` holds.
 std::string sealed(const char* format, const std::string& checksum);
 /// @throws InputError where it is another format

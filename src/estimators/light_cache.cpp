@@ -64,8 +64,9 @@ Metadata describe(const LightField& field, const LightCacheKey& key) {
 
 std::string checksum(const LightField& field, const Metadata& metadata) {
   const bool voxels = field.layout.carrier == Carrier::voxels;
-  return checksumOf(metadata, field, field.values, voxels ? &field.lattice : nullptr,
-                    voxels ? nullptr : &field.particles);
+  return checksumOf(metadata,
+                    {voxels ? &field.lattice : nullptr, voxels ? nullptr : &field.particles,
+                     field.weights.get(), std::as_bytes(std::span(field.values))});
 }
 
 }  // namespace

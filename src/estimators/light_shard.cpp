@@ -65,12 +65,12 @@ Metadata describe(const LightShard& shard) {
   return m;
 }
 
-std::string checksum(const LightShard& shard) {
+std::string checksum(const LightShard& shard, const Metadata& metadata) {
   const LightSums& light = shard.light;
   const bool onParticles = light.layout.carrier == Carrier::particles;
-  return checksumOf(describe(shard), light, light.sums,
-                    light.layout.holdsPower() ? nullptr : &light.lattice,
-                    onParticles ? &light.particles : nullptr);
+  return checksumOf(metadata, {light.layout.holdsPower() ? nullptr : &light.lattice,
+                               onParticles ? &light.particles : nullptr, light.weights.get(),
+                               std::as_bytes(std::span(light.sums))});
 }
 
 const volume::Grid& pointGrid(const volume::VdbFile& file, const char* name,
@@ -150,7 +150,7 @@ void writeLightShard(const std::filesystem::path& path, const LightShard& shard)
   points.add({"photon_sums", light.layout.valuesPerCarrier(), light.sums});
   if (light.weights) points.add({kWeightsName, 1, *light.weights});
   points.metadata = describe(shard);
-  points.metadata["photosphere_format"] = sealed(kFormat, checksum(shard));
+  points.metadata["photosphere_format"] = sealed(kFormat, checksum(shard, points.metadata));
   const double voxelSize = voxels ? light.lattice.edge() / shard.key.space.metersPerUnit : 0.0;
   std::vector<volume::Grid> grids{volume::pointsToGrid(points, kGridName, voxelSize)};
   if (voxels && light.layout.carrier == Carrier::particles)
@@ -182,7 +182,7 @@ LightShard readLightShard(const std::filesystem::path& path) {
       light.particles = readLocal(path.string(), particles, readOrder(path.string(), particles));
     }
   }
-  checkSeal(m, kFormat, checksum(shard));
+  checkSeal(m, kFormat, checksum(shard, describe(shard)));
   return shard;
 }
 

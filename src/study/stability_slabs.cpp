@@ -72,7 +72,7 @@ std::vector<SlabRadiance> slabRadiances(double g, bool quick) {
     if (f[0] != "beam" || (!top && f[4] != "L_bottom") || std::stod(f[3]) != g) continue;
     const double tau = std::stod(f[1]), albedo = std::stod(f[2]), mu = std::stod(f[5]);
     if (tau > 8 || mu < 0.3) continue;
-    if (quick && (tau != 2 || albedo != 0.9 || (mu != 0.3 && mu != 1))) continue;
+    if (quick && (tau != 2 || albedo != 0.9 || (mu != 0.3 && mu != 0.6 && mu != 1))) continue;
     const auto same = [&](const SlabRadiance& slab) {
       return slab.tau == tau && slab.albedo == albedo;
     };

@@ -30,7 +30,7 @@ struct SlabRadiance {
   static constexpr std::array kDim{1e-2, 1e-3};
 };
 
-/// Slabs of `g` with tau <= 8 and their directions of mu >= 0.3. @param quick  tau 2, two mu
+/// Slabs of `g` with tau <= 8 and their directions of mu >= 0.3. @param quick  tau 2, three mu
 /// @throws InputMissingError when reference/slab.csv is not among the shipped data
 std::vector<SlabRadiance> slabRadiances(double g, bool quick);
 

@@ -459,53 +459,51 @@ TEST(LightCache, HoldsEveryWayOfStoringDirections) {
     }
 }
 
+// A light cache that is changed as points, whose checksum stays what it was.
+class ChangedLightCache : public testing::Test {
+ protected:
+  LightField readChanged(const std::function<void(volume::ParticleSet&)>& change) const {
+    const auto path = m_folder / "light.vdb";
+    writeLightCache(path, m_field, m_key);
+    const volume::VdbFile file = volume::readVdb(path.string());
+    volume::ParticleSet points = volume::gridToPoints(file.find("light"));
+    change(points);
+    volume::writeVdb(path, {volume::pointsToGrid(points, "light", 0.0)});
+    return readLightCache(path, m_key, false);
+  }
+  const LightField& field() const { return m_field; }
+
+ private:
+  const LightField m_field = trace(sphereScene(8, 0.95, 0.5, 8, 16), histogram(), 500);
+  const LightCacheKey m_key{"m", "l", {}};
+  const TemporaryFolder m_folder;
+};
+
 // Caches from before directions had a choice say nothing of it, nor have they a checksum: nearest
 // bins that keep no mean.
-TEST(LightCache, OlderOnesStillRead) {
-  const TestScene scene = sphereScene(8, 0.95, 0.5, 8, 16);
-  const TemporaryFolder folder;
-  const LightField field = trace(scene, histogram(), 500);
-  const LightCacheKey key{"m", "l", {}};
-  const auto path = folder / "light.vdb";
-  writeLightCache(path, field, key);
-  const volume::VdbFile file = volume::readVdb(path.string());
-  volume::ParticleSet points = volume::gridToPoints(file.find("light"));
-  EXPECT_EQ(points.metadata.erase("direction"), 1u);
-  EXPECT_EQ(points.metadata.erase("representative"), 1u);
-  points.metadata["photosphere_format"] = "photosphere light cache 1";
-  volume::writeVdb(path, {volume::pointsToGrid(points, "light", 0.0)});
-  const LightField back = readLightCache(path, key, false);
-  EXPECT_EQ(back.values, field.values);
+TEST_F(ChangedLightCache, OlderOnesStillRead) {
+  const LightField back = readChanged([](volume::ParticleSet& points) {
+    EXPECT_EQ(points.metadata.erase("direction"), 1u);
+    EXPECT_EQ(points.metadata.erase("representative"), 1u);
+    points.metadata["photosphere_format"] = "photosphere light cache 1";
+  });
+  EXPECT_EQ(back.values, field().values);
   EXPECT_EQ(back.layout.direction, DirectionDeposit::nearest);
   EXPECT_EQ(back.layout.representative, Representative::bin);
 }
 
 // One value, one word of the metadata or one voxel that is not what it was.
-TEST(LightCache, DamageIsSeen) {
-  const TestScene scene = sphereScene(8, 0.95, 0.5, 8, 16);
-  const TemporaryFolder folder;
-  const LightField field = trace(scene, histogram(), 500);
-  const LightCacheKey key{"m", "l", {}};
-  const auto path = folder / "light.vdb";
-  writeLightCache(path, field, key);
-  const volume::VdbFile file = volume::readVdb(path.string());
-  const volume::ParticleSet whole = volume::gridToPoints(file.find("light"));
-  const auto complaint = [&](const std::function<void(volume::ParticleSet&)>& damage) {
-    volume::ParticleSet points = whole;
-    damage(points);
-    volume::writeVdb(path, {volume::pointsToGrid(points, "light", 0.0)});
-    try {
-      readLightCache(path, key, false);
-    } catch (const InputError& error) {
-      return std::string(error.what());
-    }
-    return std::string();
-  };
-  EXPECT_EQ(complaint([](volume::ParticleSet&) {}), "");
+TEST_F(ChangedLightCache, DamageIsSeen) {
+  EXPECT_EQ(readChanged([](volume::ParticleSet&) {}).values, field().values);
   const auto expectSeen = [&](const std::function<void(volume::ParticleSet&)>& damage) {
-    const std::string what = complaint(damage);
-    EXPECT_NE(what.find("is damaged"), std::string::npos) << what;
-    EXPECT_NE(what.find("trace it again"), std::string::npos) << what;
+    try {
+      readChanged(damage);
+      ADD_FAILURE() << "was read";
+    } catch (const InputError& error) {
+      const std::string what = error.what();
+      EXPECT_NE(what.find("is damaged"), std::string::npos) << what;
+      EXPECT_NE(what.find("trace it again"), std::string::npos) << what;
+    }
   };
   expectSeen([](volume::ParticleSet& points) {
     auto& values = std::get<std::vector<float>>(points.find("photon_histogram")->data);
