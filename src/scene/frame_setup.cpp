@@ -8,6 +8,7 @@
 #include "camera_setup.h"
 #include "effect_plan.h"
 #include "estimator_options.h"
+#include "light_notes.h"
 #include "medium_setup.h"
 #include "photon_map_stage.h"
 #include "photosphere/core/error.h"
@@ -80,14 +81,6 @@ double carrierSpacing(const std::vector<Vec3f>& particles) {
 constexpr double kSharpLobe = 0.85;
 constexpr double kSharpBandwidth = 0.2;  // [rad], epanechnikov
 constexpr int kSharpRows = 4;
-
-double sharpestLobe(const transport::Medium& medium) {
-  double sharpest = 0;
-  for (const phase::PhaseFunction& phase : medium.phases())
-    for (int i = 0; i < phase.lobes(); ++i)
-      sharpest = std::max(sharpest, std::abs(phase.lobe(i).g()));
-  return sharpest;
-}
 
 // Where the choice is the tool's: what a light cache holds was chosen when it was traced.
 bool smoothsSharpLobes(const ParamValues& e, double sharpest) {
@@ -262,6 +255,15 @@ void buildLayout(const SceneFile& scene, const SetupOptions& options, FrameSetup
   l.depositRadius = deposit > 0 ? deposit : l.radius;
 }
 
+// Of light that this frame stores itself; what a cache holds is known when it is read.
+void noteCoarseLight(const SceneFile& scene, FrameSetup& setup) {
+  if (scene.estimator.text("type") != "photosphere" || !scene.estimator.text("cache").empty() ||
+      !setup.effects.multipleScattering || setup.medium->bounds().empty())
+    return;
+  noteCoarseDirections(setup);
+  noteFewCarriers(setup);
+}
+
 // As many as a path tracer would send from the eye.
 std::int64_t lightPaths(const SceneFile& scene, const FrameSetup& setup) {
   if (setup.medium->isMoving() || setup.motion)
@@ -299,6 +301,9 @@ SceneFile withStrays(SceneFile scene) {
 FrameSetup setUpAbout(const std::optional<Vec3d>& center, const SceneFile& scene,
                       std::int64_t frame, const SetupOptions& options) {
   FrameSetup setup;
+  setup.path = scene.path.empty() && !scene.volumes.empty()
+                   ? scene.volumes.front().values.text("file")
+                   : scene.path;
   setup.frame = frame;
   setup.memoryBudget = memoryBudget(scene);
   const bool particles = scene.estimator.text("type") == "photosphere" &&
@@ -309,6 +314,7 @@ FrameSetup setUpAbout(const std::optional<Vec3d>& center, const SceneFile& scene
   planEffects(scene, options.forLightCache || !scene.estimator.text("cache").empty(), setup);
   viewFromTheMiddle(setup);
   buildLayout(scene, options, setup);
+  noteCoarseLight(scene, setup);
   const std::int64_t seed = options.seed.value_or(scene.scene.integer("seed"));
   setup.key = RandomKey::fromSeed(static_cast<std::uint64_t>(seed),
                                   scene.scene.flag("seed_per_frame") ? frame : 0);
@@ -394,10 +400,11 @@ void checkMemory(const FrameSetup& setup, bool storedLight) {
           : "Raise estimator.light_voxel, lower estimator.rows (a histogram has 8 * rows^2 bins; "
             "basis = \"view\" has one)";
   throw MemoryError(fmt::format(
-      "this frame needs about {}: {} for the smoke, {} for stored light, {} for pixels; the budget "
-      "is {}. {}, lower the resolution, or raise render.memory_limit (-1 = none)",
-      formatBytes(memory.total()), formatBytes(memory.smoke), formatBytes(memory.light),
-      formatBytes(memory.pixels), formatBytes(setup.memoryBudget), less));
+      "{}: frame {} needs about {}: {} for the smoke, {} for stored light, {} for pixels; the "
+      "budget is {}. {}, lower the resolution, or raise render.memory_limit (-1 = none)",
+      setup.path, setup.frame, formatBytes(memory.total()), formatBytes(memory.smoke),
+      formatBytes(memory.light), formatBytes(memory.pixels), formatBytes(setup.memoryBudget),
+      less));
 }
 
 }  // namespace photosphere::scene

@@ -4,6 +4,7 @@
 
 #include <tuple>
 
+#include "light_notes.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/frames.h"
 #include "photosphere/core/hash.h"
@@ -73,6 +74,7 @@ estimators::LightField readField(const SceneFile& scene, bool allowStale, FrameS
   }
   setup.layout = layout;
   noteIdleKeys(scene, setup);
+  noteCoarseDirections(setup);
   statistics.photonsEmitted = field.photons;
   statistics.lightMemoryBytes = field.memoryBytes();
   statistics.seconds.read += watch.seconds();

@@ -27,7 +27,8 @@ struct StabilityOracle {
   double least = 0;              ///< of `below`: what the mean must reach
   int code = 0;                  ///< of `error`: exit code
   std::string message;           ///< of `error`: what it must say
-  int samples = 0;               ///< of `path`: paths a pixel; 0 = the scene's
+  int samples = 0;               ///< paths a pixel: of `path`, 0 = 2048; of `finer`, of a truth
+                                 ///< that is told beside, 0 = none
   SmokeSpec smoke;               ///< of `same`
   bool ownSmoke = false;         ///< `smoke` was given
   bool bare = false;             ///< of `same`: without the case's own settings

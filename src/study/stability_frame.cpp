@@ -55,13 +55,12 @@ class Mean {
       for (int c = 0; c < 3; ++c)
         m_sums[3 * i + static_cast<std::size_t>(c)] += static_cast<double>(pixels[i][c]);
     const scene::FrameStatistics& s = frame.statistics;
-    m_answer["nan"] = s.nanSamples;
-    m_answer["negative"] = s.negativeSamples;
-    m_answer["violations"] = s.majorantViolations;
-    const double emitted = s.energyEmitted.x + s.energyEmitted.y + s.energyEmitted.z;
-    const double capped = s.energyCapped.x + s.energyCapped.y + s.energyCapped.z;
-    m_answer["capped"] = emitted > 0 ? capped / emitted : 0.0;
-    std::string notes;
+    m_nans += s.nanSamples;
+    m_negatives += s.negativeSamples;
+    m_violations += s.majorantViolations;
+    m_emitted += s.energyEmitted.x + s.energyEmitted.y + s.energyEmitted.z;
+    m_capped += s.energyCapped.x + s.energyCapped.y + s.energyCapped.z;
+    std::string notes;  // those of the last frame stand for all
     for (const std::string& note : frame.notes)
       notes += note + "; ";
     m_answer["notes"] = notes;
@@ -71,6 +70,10 @@ class Mean {
   std::string text() {
     for (double& sum : m_sums)
       sum /= m_job.seeds;
+    m_answer["nan"] = m_nans;
+    m_answer["negative"] = m_negatives;
+    m_answer["violations"] = m_violations;
+    m_answer["capped"] = m_emitted > 0 ? m_capped / m_emitted : 0.0;
     m_answer["width"] = m_width;
     m_answer["height"] = m_height;
     m_answer["pixels"] = m_sums;
@@ -81,6 +84,8 @@ class Mean {
   const StabilityFrameJob& m_job;
   int m_width = 0, m_height = 0;
   std::vector<double> m_sums;
+  std::uint64_t m_nans = 0, m_negatives = 0, m_violations = 0;
+  double m_emitted = 0, m_capped = 0;
   json m_answer;
 };
 

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cmath>
@@ -194,8 +195,10 @@ std::string countWork(std::int64_t times, std::uint64_t photons) {
     wrong += deposits.sums[i] != few.sums[i] * times + 3;
   }
   wrong += deposits.overflows.load();
+  const auto fullest = std::max_element(many.sums.begin(), many.sums.end());
   return json{{"wrong", wrong},
               {"counted", counted},
+              {"fullest", fullest == many.sums.end() ? 0.0 : static_cast<double>(*fullest)},
               {"few", lightOf(few)},
               {"many", lightOf(std::move(many))}}
       .dump();
@@ -212,7 +215,8 @@ void runSums(const StabilityCase& c, StabilityRow& row) {
     const json v = json::parse(child.text);
     judge(v.at("few").get<double>() * (times + 1), v.at("many"), row);
     const std::uint64_t wrong = v.at("wrong"), counted = v.at("counted");
-    row.message = fmt::format("{} bins counted, {} sums wrong", counted, wrong);
+    row.message = fmt::format("{} bins counted, {} sums wrong, the fullest at 2^{:.1f} of 2^63",
+                              counted, wrong, std::log2(v.at("fullest").get<double>()));
     row.passed = row.passed && wrong == 0 && counted > 0;
     return;
   }

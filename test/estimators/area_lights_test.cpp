@@ -33,7 +33,7 @@ struct Row {
 };
 
 TEST(AreaLights, AgreeWithPathTracing) {
-  if (kSanitized) GTEST_SKIP() << "a mean of many paths, too slow under a sanitizer";
+  const RunOnly runOnly;
   const TemporaryFolder folder;
   const Row rows[] = {
       {"rect",

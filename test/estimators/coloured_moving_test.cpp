@@ -63,7 +63,7 @@ void expectAgreement(const std::string& name, const TestScene& scene, int channe
 }
 
 TEST(ColouredSmoke, AgreesWithPathTracing) {
-  if (kSanitized) GTEST_SKIP() << "a mean of many paths, too slow under a sanitizer";
+  const RunOnly runOnly;
   MediumVolume v = plume(40.0);
   v.tint = Rgb(0.15f, 0.5f, 1.0f);
   v.albedo = Rgb(0.95f, 0.9f, 0.8f);
@@ -71,7 +71,7 @@ TEST(ColouredSmoke, AgreesWithPathTracing) {
 }
 
 TEST(ColouredSmoke, OfTwoColoursAgreesWithPathTracing) {
-  if (kSanitized) GTEST_SKIP() << "a mean of many paths, too slow under a sanitizer";
+  const RunOnly runOnly;
   std::vector<MediumVolume> volumes;
   volumes.push_back(plume(30.0));
   volumes.back().tint = Rgb(0.15f, 0.5f, 1.0f);
@@ -109,7 +109,7 @@ TEST(ColouredSmoke, WhiteFurnaceIsOneInEveryChannel) {
 }
 
 TEST(MovingSmoke, AgreesWithPathTracing) {
-  if (kSanitized) GTEST_SKIP() << "a mean of many paths, too slow under a sanitizer";
+  const RunOnly runOnly;
   // Eight voxels while the shutter is open, and a turn.
   const auto velocity = [](const Vec3d& p) { return Vec3d(2.5 - 2 * p.y, 2 * p.x, 0.5); };
   MediumVolume v = plume(30.0);
@@ -118,7 +118,7 @@ TEST(MovingSmoke, AgreesWithPathTracing) {
 }
 
 TEST(MovingSmoke, WithFireAgreesWithPathTracing) {
-  if (kSanitized) GTEST_SKIP() << "a mean of many paths, too slow under a sanitizer";
+  const RunOnly runOnly;
   const auto velocity = [](const Vec3d&) { return Vec3d(2.0, 0.0, 1.0); };
   MediumVolume v = plume(30.0);
   v.motion = sampledMotion(2.0, 64, velocity);
@@ -143,7 +143,7 @@ TEST(MovingSmoke, WithFireAgreesWithPathTracing) {
 
 // Two volumes of half the density, one with each phase function, are one volume that mixes both.
 TEST(OverlappingSmoke, OfHalfDensityIsOne) {
-  if (kSanitized) GTEST_SKIP() << "a mean of many paths, too slow under a sanitizer";
+  const RunOnly runOnly;
   const phase::Draine forward(0.7), back(-0.3);
   MediumVolume whole = plume(30.0);
   whole.phase = phase::PhaseFunction(forward, back, 0.5);

@@ -108,7 +108,7 @@ const Row kRows[] = {
 };
 
 TEST(DirectionOptions, AgreeWithPathTracingOnThePlume) {
-  if (kSanitized) GTEST_SKIP() << "a mean of many paths, too slow under a sanitizer";
+  const RunOnly runOnly;
   TestScene scene = plumeScene(0.7, 64, kPixels);
   scene.particles = seedParticles(*scene.medium, 15000);
   const Truth truth = pathTruth(scene, 384);

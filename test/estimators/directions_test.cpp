@@ -228,7 +228,7 @@ TEST(PerStep, DiffersFromPerViewInsideTheSmoke) {
 
 // Fluence from particles per step: one smoothing less than per view reads it with, and no lattice.
 TEST(PerStep, FluenceOnParticlesAgreesWithPerView) {
-  if (kSanitized) GTEST_SKIP() << "needs many photons";
+  const RunOnly runOnly;
   TestScene scene = sphereScene(6, 0.9, 0.5, 24, 24);
   scene.particles = particlesIn(scene, 12000);
   LightFieldLayout layout = histogram();
@@ -271,7 +271,7 @@ TEST(PerStep, ThreadsDoNotChangeOneBit) {
 
 // One bin in place of all is right in the mean: over many draws, within five standard errors.
 TEST(Merge, SampledIsFullInTheMean) {
-  if (kSanitized) GTEST_SKIP() << "a mean of many draws";
+  const RunOnly runOnly;
   TestScene scene = sphereScene(6, 0.9, 0.4, 16, 16);
   scene.particles = particlesIn(scene, 1000);
   LightFieldLayout layout = histogram();
@@ -283,7 +283,7 @@ TEST(Merge, SampledIsFullInTheMean) {
   LightField sampled = full;
   sampled.layout.merge = Merge::sampled;
   const auto exact = resolve(*scene.medium, full, scene.view());
-  constexpr int draws = 100;
+  const int draws = static_cast<int>(fewer(100));
   for (const Vec3f& p : kPlaces) {
     const auto c = coefficientsAt(scene, p);
     double sum = 0, squares = 0;

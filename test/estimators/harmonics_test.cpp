@@ -127,7 +127,7 @@ TEST(Harmonics, DoNotRingWhereALobeIsNarrow) {
 
 // The truth itself is noisy at this length: bounds are those of its noise.
 TEST(Harmonics, AgreeWithPathTracing) {
-  if (kSanitized) GTEST_SKIP() << "a mean of many paths, too slow under a sanitizer";
+  const RunOnly runOnly;
   const struct {
     double g;
     int order;

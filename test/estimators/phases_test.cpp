@@ -34,7 +34,7 @@ void expectClose(const Row& row, const char* way, const LayerError& e, double me
 }
 
 TEST(Phases, AgreeWithPathTracing) {
-  if (kSanitized) GTEST_SKIP() << "a mean of many paths, too slow under a sanitizer";
+  const RunOnly runOnly;
   for (const Row& row : kRows) {
     transport::MediumVolume smoke =
         sampledVolume(1.0, 64, {.albedo = 0.9, .extinction = 40.0}, plumeDensity);

@@ -83,7 +83,7 @@ INSTANTIATE_TEST_SUITE_P(
     });
 
 TEST(PhotonMapTest, ErrorFallsWithTheRadius) {
-  if (kSanitized) GTEST_SKIP() << "a mean of many paths, too slow under a sanitizer";
+  const RunOnly runOnly;
   for (const char* name : {"sphere", "plume"}) {
     const Judged& j = judged(name);
     const LayerError wide =

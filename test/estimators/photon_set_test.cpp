@@ -206,7 +206,7 @@ TEST(PhotonSetTest, NearestAreThoseOfASortedList) {
 
 // The photon that ends the ball is left out: without that the mean would be (k + 1) / k too large.
 TEST(PhotonSetTest, NearestEstimateTheDensityWithoutBias) {
-  if (kSanitized) GTEST_SKIP() << "a mean over many lookups, too slow under a sanitizer";
+  const RunOnly runOnly;
   const int count = 60'000;
   const std::uint32_t k = 5;
   PhotonColumns photons = makePhotons(count, 1, [](int, Rng& rng) { return randomPoint(rng); });
@@ -215,7 +215,7 @@ TEST(PhotonSetTest, NearestEstimateTheDensityWithoutBias) {
   for (const SpatialKernel kernel : kKernels) {
     const auto set = makeNearestSet(photons, kernel, k, 0.5);
     Rng rng(RandomKey::fromSeed(13, 0), RandomStream::test, 0);
-    const int lookups = 20'000;
+    const int lookups = static_cast<int>(fewer(20'000));
     double sum = 0;
     for (int i = 0; i < lookups; ++i)
       sum += static_cast<double>(set->scattered(0.2f + 0.6f * randomPoint(rng), {0, 0, 1}, even).x);

@@ -151,7 +151,7 @@ INSTANTIATE_TEST_SUITE_P(Carriers, Furnace,
 
 // Every legal layout that reaches the same answer by another way.
 TEST(LightField, CollisionDepositAgreesInTheMean) {
-  if (kSanitized) GTEST_SKIP() << "a mean of many paths, too slow under a sanitizer";
+  const RunOnly runOnly;
   const TestScene scene = sphereScene(6, 0.9, 0.3, 32, kPixels);
   const render::FrameLayers truth = renderPath(scene, 256, 1);
   LightFieldLayout layout;
@@ -187,7 +187,7 @@ double powerRatio(const TestScene& scene, estimators::EnergyRule rule, double ra
 }
 
 TEST(LightField, PowerOnParticlesConvergesWithItsRadius) {
-  if (kSanitized) GTEST_SKIP() << "a mean of many paths, too slow under a sanitizer";
+  const RunOnly runOnly;
   TestScene scene = sphereScene(6, 0.9, 0.3, 32, kPixels);
   scene.particles = seedParticles(*scene.medium, 60000);
   const render::FrameLayers truth = renderPath(scene, 256, 1);

@@ -18,7 +18,7 @@ using namespace estimators;
 
 // A kernel of four light voxels over a ball that is lit from one side, where the ways differ most.
 TEST(FluenceSmoothing, DensityGainsWhatPlainLosesAndTheOthersAreBetween) {
-  if (kSanitized) GTEST_SKIP() << "a mean of many paths, too slow under a sanitizer";
+  const RunOnly runOnly;
   const TestScene scene = sphereScene(8, 0.95, 0.5, 32, 48);
   const Truth truth = pathTruth(scene, 128);
   std::map<Smoothing, LayerError> errors;
@@ -128,7 +128,7 @@ class OpaqueVoxels : public ::testing::TestWithParam<double> {};
 
 // A voxel's mean says little of light that enters and leaves within a hundredth of it.
 TEST_P(OpaqueVoxels, KeepWhatIsSeenOfThem) {
-  if (kSanitized) GTEST_SKIP() << "a mean of many paths, too slow under a sanitizer";
+  const RunOnly runOnly;
   TestScene scene = sphereScene(GetParam(), 0.95, 0.0, 16, 32);
   scene.particles = pointsInBall(20'000);
   const Truth truth = pathTruth(scene, 64);
@@ -161,7 +161,7 @@ INSTANTIATE_TEST_SUITE_P(FluenceSmoothing, OpaqueVoxels, ::testing::Values(60.0,
 
 // An eye that flies into thick smoke goes on seeing it: in a furnace, as bright as outside.
 TEST(FluenceSmoothing, WhatAnEyeInsideSeesIsKept) {
-  if (kSanitized) GTEST_SKIP() << "a path to many scatterings, too slow under a sanitizer";
+  const RunOnly runOnly;
   TestScene scene;
   scene.medium = std::make_unique<transport::Medium>(
       makeMedium(sampledVolume(1.0, 16, {1.0, 0.0, 40.0},
@@ -183,7 +183,7 @@ TEST(FluenceSmoothing, WhatAnEyeInsideSeesIsKept) {
 
 // Collisions are weighed as track lengths are.
 TEST(FluenceSmoothing, WhatTheEyeSeesOfCollisionsIsKept) {
-  if (kSanitized) GTEST_SKIP() << "a mean of many paths, too slow under a sanitizer";
+  const RunOnly runOnly;
   const TestScene scene = sphereScene(60, 0.95, 0.0, 16, 32);
   const Truth truth = pathTruth(scene, 100);
   LightFieldLayout layout;

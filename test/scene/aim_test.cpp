@@ -1,5 +1,6 @@
 // Photons and light voxels where the picture can see their effect.
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "fixture.h"
@@ -54,7 +55,7 @@ class AimScene : public ::testing::Test {
 };
 
 TEST_F(AimScene, SteeringIsUnbiased) {
-  if (kSanitized) GTEST_SKIP() << "a mean of many photons, too slow under a sanitizer";
+  const RunOnly runOnly;
   const std::vector<std::vector<std::string>> lamps = {
       {},
       {"light=[{ type = \"rect\", position = [3, 3, 1], target = [0, 0, 0], size = [1, 1], "
@@ -67,7 +68,7 @@ TEST_F(AimScene, SteeringIsUnbiased) {
   };
   for (const auto& lamp : lamps) {
     std::vector<std::string> sets = lamp;
-    sets.push_back("estimator.photons=150000");
+    sets.push_back(fmt::format("estimator.photons={}", fewer(150000)));
     sets.push_back("camera.fov=9");
     const FrameResult even = renderScene(make(closeUp("off", sets)), 1);
     const FrameResult aimed = renderScene(make(closeUp("on", sets)), 1);
@@ -96,8 +97,8 @@ TEST_F(AimScene, SteeringIsUnbiased) {
 }
 
 TEST_F(AimScene, SteeringLowersTheNoiseOfACloseUp) {
-  if (kSanitized) GTEST_SKIP() << "a mean of many photons, too slow under a sanitizer";
-  const std::vector<std::string> few{"estimator.photons=4000"};
+  const RunOnly runOnly;
+  const std::vector<std::string> few{fmt::format("estimator.photons={}", fewer(4000))};
   EXPECT_LT(noise(closeUp("on", few)), 0.7 * noise(closeUp("off", few)));
 }
 

@@ -1,5 +1,6 @@
 // Smoke that moves and coloured extinction, from the scene file to the frame.
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "fixture.h"
@@ -68,7 +69,7 @@ TEST_F(MovingScene, BlursAlongItsWay) {
 }
 
 TEST_F(MovingScene, PathsAndPhotonsAgree) {
-  if (kSanitized) GTEST_SKIP() << "a mean of many paths, too slow under a sanitizer";
+  const RunOnly runOnly;
   const auto mean = [](const std::vector<Rgb>& pixels) {
     double sum = 0;
     for (const Rgb& p : pixels)
@@ -76,7 +77,8 @@ TEST_F(MovingScene, PathsAndPhotonsAgree) {
     return sum;
   };
   const std::vector<std::string> sets{"volume.0.velocity=v", "render.samples=16",
-                                      "estimator.photons=200000"};
+                                      fmt::format("estimator.photons={}", fewer(200000)),
+                                      fmt::format("estimator.samples={}", fewer(256))};
   const FrameResult photons = renderScene(make(sets), 1);
   std::vector<std::string> paths = sets;
   paths.emplace_back("estimator.type=path_traced");

@@ -177,6 +177,9 @@ class TargetError : public ::testing::Test {
     return parseScene(ballScene(m_file, Vec3d(0.0), 1.0), "test.toml", m_folder.path(), sets);
   }
   FrameResult render(const std::vector<std::string>& sets) { return renderScene(scene(sets), 1); }
+  static std::string photons(std::uint64_t count) {
+    return fmt::format("estimator.photons={}", fewer(count));
+  }
 
   TemporaryFolder m_folder;
   std::string m_file;
@@ -184,15 +187,16 @@ class TargetError : public ::testing::Test {
 
 // What each estimator says of itself against path tracing with sixty times the samples.
 TEST_F(TargetError, TheEstimateIsTheErrorThatThereIs) {
-  if (kSanitized) GTEST_SKIP() << "a truth of many paths, too slow under a sanitizer";
-  const FrameResult truth = render({"estimator.type=path_traced", "estimator.samples=1000"});
+  const RunOnly runOnly;
+  const FrameResult truth =
+      render({"estimator.type=path_traced", fmt::format("estimator.samples={}", fewer(1000))});
   const std::vector<std::string> ways[] = {
       {"estimator.type=path_traced", "estimator.samples=32"},
       {"estimator.type=light_traced", "estimator.samples=32"},
-      {"estimator.type=photosphere", "estimator.photons=20000"},
-      {"estimator.type=photosphere", "estimator.photons=400000", "estimator.radius=0.5"},
-      {"estimator.type=photon_map", "estimator.photons=40000"},
-      {"estimator.type=photon_map", "estimator.photons=100000", "estimator.radius=0.3"}};
+      {"estimator.type=photosphere", photons(20000)},
+      {"estimator.type=photosphere", photons(400000), "estimator.radius=0.5"},
+      {"estimator.type=photon_map", photons(40000)},
+      {"estimator.type=photon_map", photons(100000), "estimator.radius=0.3"}};
   for (std::vector<std::string> sets : ways) {
     const std::string name = sets[0] + " " + sets[1];
     sets.emplace_back("render.target_error=10");
@@ -211,7 +215,7 @@ TEST_F(TargetError, TheEstimateIsTheErrorThatThereIs) {
 
 // The few pixels of a crop, at the edge of the smoke and in it, are judged as a frame is.
 TEST_F(TargetError, OfACropIsThatOfItsPixels) {
-  if (kSanitized) GTEST_SKIP() << "a truth of many paths, too slow under a sanitizer";
+  const RunOnly runOnly;
   for (const render::Crop& crop :
        {render::Crop{{2, 8}, {18, 24}}, render::Crop{{12, 12}, {20, 20}}}) {
     RenderRequest request;
@@ -219,11 +223,12 @@ TEST_F(TargetError, OfACropIsThatOfItsPixels) {
     const auto with = [&](const std::vector<std::string>& sets) {
       return renderScene(scene(sets), 1, request);
     };
-    const FrameResult truth = with({"estimator.type=path_traced", "estimator.samples=2500"});
+    const FrameResult truth =
+        with({"estimator.type=path_traced", fmt::format("estimator.samples={}", fewer(2500))});
     for (std::vector<std::string> sets :
          {std::vector<std::string>{"estimator.type=path_traced", "estimator.samples=32"},
           {"estimator.type=light_traced", "estimator.samples=32"},
-          {"estimator.type=photosphere", "estimator.photons=400000", "estimator.radius=0.5"}}) {
+          {"estimator.type=photosphere", photons(400000), "estimator.radius=0.5"}}) {
       sets.emplace_back("render.target_error=10");
       const FrameResult r = with(sets);
       ASSERT_TRUE(r.statistics.error) << sets[0];

@@ -106,6 +106,7 @@ std::vector<Vec3f> seedParticles(const transport::Medium& medium, std::size_t co
 
 render::FrameLayers renderPath(const TestScene& scene, int samples, std::uint64_t seed) {
   const auto path = render::makePathIntegrator(*scene.medium, scene.lights, {});
+  samples = static_cast<int>(fewer(static_cast<std::uint64_t>(samples)));
   return render::renderFrame(*scene.camera, *path, frameOptions(scene, samples, seed));
 }
 
@@ -113,6 +114,7 @@ PhotosphereFrame renderPhotosphere(const TestScene& scene, estimators::LightFiel
                                    std::uint64_t photons, std::uint64_t seed, int samples,
                                    int gatherRays) {
   PhotosphereFrame frame;
+  photons = fewer(photons);
   layout.phases = static_cast<int>(scene.medium->phases().size());
   if (layout.radius == 0) layout.radius = automaticRadius(*scene.medium, layout, photons);
   if (layout.depositRadius == 0) layout.depositRadius = layout.radius;
@@ -135,6 +137,7 @@ PhotosphereFrame renderPhotosphere(const TestScene& scene, estimators::LightFiel
 PhotosphereFrame renderPhotonMap(const TestScene& scene, estimators::PhotonMapLayout layout,
                                  std::uint64_t photons, std::uint64_t seed, int samples) {
   PhotosphereFrame frame;
+  photons = fewer(photons);
   transport::TraceOptions options;
   options.photons = photons;
   options.key = RandomKey::fromSeed(seed, 0);

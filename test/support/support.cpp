@@ -1,9 +1,11 @@
 #include "support/support.h"
 
 #include <fcntl.h>
+#include <gtest/gtest-spi.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <iterator>
@@ -15,6 +17,29 @@
 namespace photosphere::test {
 
 namespace fs = std::filesystem;
+
+namespace {
+int g_onlyRun = 0;
+}
+
+struct RunOnly::Deaf {
+  ::testing::TestPartResultArray results;
+  ::testing::ScopedFakeTestPartResultReporter reporter{&results};
+};
+
+RunOnly::RunOnly() {
+  if (!kSanitized) return;
+  m_deaf = std::make_unique<Deaf>();
+  ++g_onlyRun;
+}
+
+RunOnly::~RunOnly() {
+  if (kSanitized) --g_onlyRun;
+}
+
+std::uint64_t fewer(std::uint64_t count) {
+  return g_onlyRun > 0 ? std::max<std::uint64_t>(1, count / 50) : count;
+}
 
 TemporaryFolder::TemporaryFolder() {
   std::string pattern = (fs::temp_directory_path() / "photosphere-test-XXXXXX").string();

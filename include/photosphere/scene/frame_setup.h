@@ -42,6 +42,7 @@ struct EffectState {
 };
 
 struct FrameSetup {
+  std::string path;  ///< of the scene file, or of the first cache where there is none: for messages
   std::int64_t frame = 0;
   lights::LocalSpace space;
   Box3d worldBounds;  ///< of everything that can scatter [scene units]; empty without smoke

@@ -1,0 +1,59 @@
+#include "light_notes.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace photosphere::scene {
+
+namespace {
+
+// Directions that stored light tells apart lie so many widths of a lobe apart before it is said. By
+// then 32 bins show a fifth less light than there is, or a lobe's light beside it (README.md,
+// bases of directions).
+constexpr double kWidths = 6;
+
+// A ball of three spacings, the automatic radius, holds about as many particles.
+constexpr std::size_t kFewCarriers = 20;
+
+}  // namespace
+
+double sharpestLobe(const transport::Medium& medium) {
+  double sharpest = 0;
+  for (const phase::PhaseFunction& phase : medium.phases())
+    for (int i = 0; i < phase.lobes(); ++i)
+      sharpest = std::max(sharpest, std::abs(phase.lobe(i).g()));
+  return sharpest;
+}
+
+void noteCoarseDirections(FrameSetup& setup) {
+  using estimators::Basis;
+  const estimators::LightFieldLayout& l = setup.layout;
+  const double g = sharpestLobe(*setup.medium);
+  if (l.basis == Basis::view || !(g > 0)) return;
+  const bool bins = l.basis == Basis::histogram;
+  const double apart = bins ? std::sqrt(4 * kPi / l.bins()) : kPi / std::max(1, l.order);  // [rad]
+  // Henyey and Greenstein's lobe has fallen to a third or so of its peak there.
+  const double width = (1 - g) / std::sqrt(g);
+  if (apart <= kWidths * width) return;
+  setup.notes.push_back(fmt::format(
+      "a phase function has a lobe of g = {:.6g}, narrower than the directions that stored light "
+      "tells apart ({}, {:.2g} rad): light scattered more than once is too dim in it or too bright "
+      "beside it; raise estimator.{} (basis = \"view\", without a cache or final_gather, tells all "
+      "apart)",
+      g, bins ? fmt::format("{} bins", l.bins()) : fmt::format("harmonics of order {}", l.order),
+      apart, bins ? "rows" : "order"));
+}
+
+void noteFewCarriers(FrameSetup& setup) {
+  if (setup.layout.carrier != estimators::Carrier::particles ||
+      setup.particles.size() >= kFewCarriers)
+    return;
+  setup.notes.push_back(fmt::format(
+      "{} particle{} all the light that is scattered more than once, which is one value around "
+      "each; estimator.carrier = \"voxels\" stores it as fine as the smoke",
+      setup.particles.size(), setup.particles.size() == 1 ? " carries" : "s carry"));
+}
+
+}  // namespace photosphere::scene
