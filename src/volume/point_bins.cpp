@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <tuple>
 
 #include "photosphere/core/error.h"
@@ -14,8 +15,11 @@ namespace photosphere::volume {
 
 namespace {
 
+// As floats, which smoke is made of. One particle farther than that, garbage of a simulation, would
+// make voxels so large that all others are at one place of one of them.
 bool isFinite(const Vec3d& p) {
-  return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z);
+  return maxComponent(glm::abs(p)) <= static_cast<double>(std::numeric_limits<float>::max()) &&
+         p.x == p.x && p.y == p.y && p.z == p.z;
 }
 
 Box3d finiteBounds(const std::vector<Vec3d>& positions) {

@@ -86,6 +86,46 @@ TEST_F(HardValues, LightVoxelsFitTheSmoke) {
   EXPECT_FALSE(notes(setUp(few, {"estimator.type=photon_map"}), "estimator.light_voxel"));
 }
 
+// Balls of two voxels radius that do not touch, in a box of `voxels` across.
+volume::Grid cloudOfBalls(int voxels, double edge) {
+  const auto inBall = [](const Vec3d& p) {
+    return glm::length(glm::mod(p, Vec3d(6.0)) - Vec3d(3.0)) < 2.3 ? 1.0f : 0.0f;
+  };
+  std::vector<float> values;
+  for (int z = 0; z < voxels; ++z)
+    for (int y = 0; y < voxels; ++y)
+      for (int x = 0; x < voxels; ++x)
+        values.push_back(inBall(Vec3d(x, y, z)));
+  Mat4d worldFromIndex(edge);
+  worldFromIndex[3] = glm::dvec4(Vec3d(-edge * (voxels - 1) / 2.0), 1.0);
+  return volume::denseToGrid("density", Vec3i(voxels), values, worldFromIndex);
+}
+
+// Smoke of many voxels may be of many parts of few.
+TEST_F(HardValues, LightVoxelsFitClumps) {
+  const std::string file = write("balls.vdb", {cloudOfBalls(60, 2.0 / 60)});
+  const FrameSetup setup = setUp(file, {"volume.0.density_scale=10"});
+  EXPECT_EQ(setup.layout.lightVoxel, 1);
+  EXPECT_TRUE(notes(setup, "in clumps of about a light voxel"));
+  if (kSanitized) return;
+  const auto mean = [&](const std::vector<std::string>& sets) {
+    std::vector<std::string> all{"volume.0.density_scale=10", "render.samples=16"};
+    all.insert(all.end(), sets.begin(), sets.end());
+    const SceneFile scene =
+        parseScene(ballScene(file, Vec3d(0), 1), "t.toml", m_folder.path(), all);
+    double sum = 0;
+    for (const Rgb& pixel : renderScene(scene, 1).layers.multiple)
+      sum += static_cast<double>(pixel.y);
+    return sum;
+  };
+  const double truth = mean({"estimator.type=path_traced", "estimator.samples=128"});
+  const double fine = mean({"estimator.photons=200000"}) / truth;
+  const double coarse = mean({"estimator.photons=200000", "estimator.light_voxel=2"}) / truth;
+  std::printf("  over path tracing: voxels of 1 %.4f, of 2 %.4f\n", fine, coarse);
+  EXPECT_NEAR(fine, 1.0, 0.05);
+  EXPECT_LT(coarse, fine - 0.02);
+}
+
 TEST_F(HardValues, AKernelIsNoWiderThanCanBePaid) {
   const std::string file = write("a.vdb", {ballGrid("density", Vec3d(0), 0.1)});
   const FrameSetup wide = setUp(file, {"estimator.radius=100"});

@@ -161,6 +161,24 @@ TEST(PointsRoundTrip, LeavesOutPositionsThatAreNotFinite) {
   EXPECT_EQ(gridToPoints(pointsToGrid(set, "p", 0)).size(), 8u);
 }
 
+// Garbage that is finite in the file, and farther than floats reach, is as none: voxels that hold
+// it too would be so large that all else is at one place.
+TEST(PointsRoundTrip, LeavesOutPositionsPastWhatFloatsHold) {
+  for (const double far : {4e38, 1e60, 1e300}) {
+    ParticleSet set;
+    for (int i = 0; i < 100; ++i)
+      set.positions.emplace_back(i, 2 * i, -i);
+    set.positions.emplace_back(far, 0, 0);
+    set.positions.emplace_back(0, -far, 0);
+    const ParticleSet back = gridToPoints(pointsToGrid(set, "points", 0));
+    ASSERT_EQ(back.size(), 100u) << far;
+    double sum = 0;
+    for (const Vec3d& p : back.positions)
+      sum += p.x;
+    EXPECT_NEAR(sum, 99 * 50, 1e-2) << far;
+  }
+}
+
 TEST(PointsRoundTrip, RefusesAColumnOfTheWrongLength) {
   ParticleSet set = sampleParticles(10, Vec3d(0));
   set.add({"short", 1, std::vector<float>(9)});
