@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <utility>
 
 #include "instances.h"
 #include "lamp_choice.h"
@@ -16,6 +18,13 @@ using transport::Segment;
 using Field = volume::BrickField<float>;
 
 namespace {
+
+float attenuated(float depth) {
+  return fastExp(-depth);
+}
+Rgb attenuated(const Rgb& depth) {
+  return {fastExp(-depth.x), fastExp(-depth.y), fastExp(-depth.z)};
+}
 
 // True when one of the eight voxels around a node holds smoke.
 bool besideSmoke(const transport::SupportLattice& lattice, const Vec3i& node) {
@@ -34,6 +43,29 @@ constexpr double kMostTimes = 9;
 constexpr double kThickVoxel = 2;
 constexpr double kThickShare = 0.2;
 
+// The same share of what rays from the camera end in: an eye inside thick smoke sees little else.
+double thickShare(const Medium& medium, std::span<const cameras::CameraRay> rays) {
+  const auto thick = static_cast<float>(kThickVoxel / medium.voxelEdge());
+  double all = 0, inThick = 0;
+  for (const cameras::CameraRay& ray : rays) {
+    const Segment inside = transport::clipToMedium(medium, ray.origin, Vec3f(ray.direction),
+                                                   std::numeric_limits<double>::infinity());
+    float through = 1.0f;
+    for (volume::MajorantGrid::Walk walk(medium.majorants(), inside.origin, inside.direction, 0.0f,
+                                         inside.length);
+         !walk.done() && through > 0.01f; walk.advance()) {
+      if (!(walk.majorant() > 0.0f)) continue;
+      const float length = walk.end() - walk.begin();
+      const Vec3f middle = inside.origin + inside.direction * (walk.begin() + 0.5f * length);
+      const float before =
+          std::exchange(through, through * attenuated(length * medium.extinction(middle)));
+      all += static_cast<double>(before - through);
+      if (walk.majorant() > thick) inThick += static_cast<double>(before - through);
+    }
+  }
+  return all > 0 ? inThick / all : 0;
+}
+
 // Smoke so few voxels across, in the mean of three directions, has no room for a grid of them: one
 // of four voxels loses 1 to 3 % of the light scattered once. Rays to the lamps are as short, and
 // marched.
@@ -43,26 +75,19 @@ bool isSmall(const Medium& medium) {
   return std::cbrt(size.x * size.y * size.z) < kFewVoxels;
 }
 
-float attenuated(float depth) {
-  return fastExp(-depth);
-}
-Rgb attenuated(const Rgb& depth) {
-  return {fastExp(-depth.x), fastExp(-depth.y), fastExp(-depth.z)};
-}
-
 }  // namespace
 
 Shadows::Shadows(const Medium& medium, const transport::LightList& lights, ShadowMode mode,
-                 float step, std::uint64_t budgetBytes)
+                 float step, std::uint64_t budgetBytes, std::span<const cameras::CameraRay> seen)
     : m_medium(&medium), m_mode(mode), m_step(step), m_tabulated(lights.size()) {
   if (mode != ShadowMode::grid || medium.bounds().empty()) return;
-  if (const double share =
-          medium.majorants().shareAbove(static_cast<float>(kThickVoxel / medium.voxelEdge()));
-      share > kThickShare) {
+  const double ofAll =
+      medium.majorants().shareAbove(static_cast<float>(kThickVoxel / medium.voxelEdge()));
+  if (const double share = std::max(ofAll, thickShare(medium, seen)); share > kThickShare) {
     log::info(
-        "{:.0f} % of the smoke is thicker than {} optical depths a voxel: no grid holds its "
+        "{:.0f} % of the smoke{} is thicker than {} optical depths a voxel: no grid holds its "
         "shadows, they are tracked (render.shadow = \"track\")",
-        100 * share, kThickVoxel);
+        100 * share, share > ofAll ? " that is seen" : "", kThickVoxel);
     m_mode = ShadowMode::track;
     return;
   }

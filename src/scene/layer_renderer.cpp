@@ -37,6 +37,19 @@ std::uint64_t shadowBudget(const FrameSetup& setup) {
   return setup.memoryBudget > used ? setup.memoryBudget - used : 1;
 }
 
+// A few rays of the camera, spread over the frame, in local space.
+std::vector<cameras::CameraRay> raysOver(const FrameSetup& setup) {
+  constexpr int kRays = 16;  // across, and down
+  std::vector<cameras::CameraRay> rays;
+  const Vec2d size(setup.camera->resolution());
+  for (int y = 0; y < kRays; ++y)
+    for (int x = 0; x < kRays; ++x) {
+      rays.push_back(setup.camera->ray((Vec2d(x, y) + 0.5) / static_cast<double>(kRays) * size));
+      rays.back().origin = setup.space.localFromWorld(rays.back().origin);
+    }
+  return rays;
+}
+
 render::FrameOptions frameOptions(const SceneFile& scene, const render::Crop& crop,
                                   const FrameSetup& setup, bool paths) {
   render::FrameOptions options;
@@ -84,7 +97,7 @@ LayerRenderer::LayerRenderer(const SceneFile& scene, const render::Crop& crop,
                         : render::ShadowMode::march;  // tabulates nothing
   m_shadows.emplace(*setup.medium, setup.lights, mode,
                     m_march.step * static_cast<float>(setup.medium->voxelEdge()),
-                    shadowBudget(setup));
+                    shadowBudget(setup), raysOver(setup));
 }
 
 render::FrameLayers LayerRenderer::render(const estimators::InscatterSource* source, int pass,

@@ -4,8 +4,10 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
+#include "photosphere/cameras/camera.h"
 #include "photosphere/core/rng.h"
 #include "photosphere/transport/medium.h"
 #include "photosphere/transport/photon_tracer.h"
@@ -29,8 +31,10 @@ class Shadows {
   /// those of volumes whose extinctions have different colours, for each channel.
   /// @param step         march step [m]
   /// @param budgetBytes  grids past it fall back to `march`, said in the log; 0 = no limit
+  /// @param seen         rays of the camera, local space; smoke whose shadows a grid cannot hold
+  ///                     counts as much where these end as in all the smoke
   Shadows(const transport::Medium& medium, const transport::LightList& lights, ShadowMode mode,
-          float step, std::uint64_t budgetBytes);
+          float step, std::uint64_t budgetBytes, std::span<const cameras::CameraRay> seen = {});
   ~Shadows();
 
   /// Transmittance from `p` to lamp `light` [0, 1].
