@@ -2,9 +2,8 @@
 
 #include <fmt/format.h>
 
-#include <new>
-
 #include "photosphere/core/error.h"
+#include "photosphere/core/exhaustion.h"
 #include "photosphere/core/frames.h"
 #include "photosphere/core/interrupt.h"
 #include "photosphere/core/log.h"
@@ -35,7 +34,24 @@ bool vdbIsComplete(const std::string& path) {
   return std::filesystem::is_regular_file(path) && volume::probeVdb(path, reason);
 }
 
-int runFrames(const std::vector<std::int64_t>& frames, bool keepGoing,
+namespace {
+
+void runFrame(const std::string& source, std::int64_t frame,
+              const std::function<void(std::int64_t)>& body) {
+  try {
+    body(frame);
+  } catch (const Error&) {
+    throw;
+  } catch (const std::exception&) {
+    const Resource lacking = exhausted();
+    if (lacking == Resource::none) throw;
+    throw MemoryError(fmt::format("{}: frame {}: {}", source, frame, remedyFor(lacking)));
+  }
+}
+
+}  // namespace
+
+int runFrames(const std::string& source, const std::vector<std::int64_t>& frames, bool keepGoing,
               const std::function<void(std::int64_t)>& body) {
   std::vector<std::int64_t> failed;
   auto report = [&](std::int64_t frame, const char* why) {
@@ -45,15 +61,13 @@ int runFrames(const std::vector<std::int64_t>& frames, bool keepGoing,
   for (const std::int64_t frame : frames) {
     throwIfInterrupted();
     if (!keepGoing) {
-      body(frame);
+      runFrame(source, frame, body);
       continue;
     }
     try {
-      body(frame);
+      runFrame(source, frame, body);
     } catch (const InterruptedError&) {
       throw;
-    } catch (const std::bad_alloc&) {
-      report(frame, "out of memory");
     } catch (const std::exception& error) {
       report(frame, error.what());
     }

@@ -21,8 +21,10 @@ bool vdbIsComplete(const std::string& path);
 
 /// Calls `body` frame by frame. With `keepGoing` a frame that fails is reported and the others
 /// follow; an interrupt always ends the loop.
+/// @param source  what the frames are of, for messages
 /// @return exit code: ok, or someFramesFailed
-int runFrames(const std::vector<std::int64_t>& frames, bool keepGoing,
+/// @throws MemoryError that names source and frame where memory or threads ran out
+int runFrames(const std::string& source, const std::vector<std::int64_t>& frames, bool keepGoing,
               const std::function<void(std::int64_t)>& body);
 
 }  // namespace photosphere::cli

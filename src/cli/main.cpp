@@ -7,11 +7,11 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
-#include <new>
 
 #include "command.h"
 #include "options.h"
 #include "photosphere/core/error.h"
+#include "photosphere/core/exhaustion.h"
 #include "photosphere/core/interrupt.h"
 #include "photosphere/core/log.h"
 #include "photosphere/core/output_file.h"
@@ -86,9 +86,9 @@ int guarded(int argc, char** argv) {
     return 128 + error.signal();
   } catch (const Error& error) {
     return report(error.code(), error.what());
-  } catch (const std::bad_alloc&) {
-    return report(ExitCode::memory, "out of memory; use fewer photons, particles or voxels");
   } catch (const std::exception& error) {
+    if (const Resource lacking = exhausted(); lacking != Resource::none)
+      return report(ExitCode::memory, remedyFor(lacking));
     return report(ExitCode::unspecified, error.what());
   }
 }

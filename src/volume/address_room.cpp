@@ -1,11 +1,11 @@
 #include "address_room.h"
 
 #include <sys/resource.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <fstream>
 #include <mutex>
+
+#include "photosphere/core/resources.h"
 
 namespace photosphere::volume {
 
@@ -19,12 +19,6 @@ bool g_limited = false;
 struct rlimit g_before {};
 
 }  // namespace
-
-std::uint64_t reservedAddresses() {
-  std::uint64_t pages = 0;
-  std::ifstream("/proc/self/statm") >> pages;
-  return pages * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
-}
 
 AddressRoom::AddressRoom(std::uint64_t bytes) {
   const std::lock_guard<std::mutex> lock(g_mutex);

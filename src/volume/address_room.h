@@ -5,9 +5,6 @@
 
 namespace photosphere::volume {
 
-/// Bytes of addresses that the process has reserved; 0 where the system does not tell.
-std::uint64_t reservedAddresses();
-
 /// While one lives, the process may reserve so many bytes of addresses more than it had, and what
 /// asks for more gets std::bad_alloc. Several may live at a time, on any threads: their rooms add
 /// up. Does nothing where a sanitizer has reserved terabytes, or a tighter limit holds already.

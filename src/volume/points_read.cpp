@@ -4,6 +4,7 @@
 #include <openvdb/points/AttributeArrayString.h>
 #include <openvdb/points/PointDataGrid.h>
 
+#include <limits>
 #include <new>
 #include <stdexcept>
 #include <type_traits>
@@ -214,6 +215,9 @@ ParticleSet gridToPoints(const Grid& grid) {
   } catch (const openvdb::Exception& error) {
     throw InputError(describe(grid), std::string("is damaged: ") + error.what());
   } catch (const std::bad_alloc&) {
+    if (freeAddresses() < std::numeric_limits<std::uint64_t>::max())
+      throw MemoryError(describe(grid) +
+                        ": memory ran out while reading it; raise its limit (ulimit -v)");
     throw InputError(describe(grid), "claims more points than there is memory for");
   } catch (const std::length_error&) {
     throw InputError(describe(grid), "claims more points than there is memory for");

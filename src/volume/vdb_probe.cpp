@@ -14,9 +14,10 @@
 #include <system_error>
 #include <thread>
 
-#include "address_room.h"
 #include "photosphere/core/error.h"
+#include "photosphere/core/exhaustion.h"
 #include "photosphere/core/parallel.h"
+#include "photosphere/core/resources.h"
 #include "photosphere/volume/vdb_file.h"
 #include "vdb_walk.h"
 
@@ -62,7 +63,8 @@ void setLimit(decltype(RLIMIT_AS) resource, rlim_t value) {
     code = static_cast<int>(error.code());
   } catch (const std::exception& error) {
     message = path.string() + ": " + error.what();
-    code = static_cast<int>(ExitCode::inputInvalid);
+    code =
+        static_cast<int>(exhausted() == Resource::none ? ExitCode::inputInvalid : ExitCode::memory);
   }
   const ssize_t ignored = write(pipe, message.data(), message.size());
   static_cast<void>(ignored);
@@ -134,6 +136,11 @@ bool probeVdb(const std::filesystem::path& path, std::string& reason) {
     reason.clear();
     return true;
   }
+  // What the child may take is bounded by this process's own limit.
+  if (WIFEXITED(status) && WEXITSTATUS(status) == static_cast<int>(ExitCode::memory) &&
+      freeAddresses() < limits.memory)
+    throw MemoryError(path.string() +
+                      ": memory ran out while reading it; raise its limit (ulimit -v)");
   if (WIFSIGNALED(status)) reason = signalReason(path, WTERMSIG(status), limits);
   if (reason.empty()) reason = path.string() + ": cannot be read";
   return false;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <new>
 
 #include "address_room.h"
@@ -22,8 +23,27 @@ namespace {
 // (LZ4, which blosc uses), of which reading holds up to three copies.
 constexpr std::uint64_t kLargestRatio = 1024, kRoom = std::uint64_t(256) << 20;
 
+std::uint64_t mostFor(std::uint64_t fileSize) {
+  return kRoom + kLargestRatio * fileSize;
+}
+
 std::uint64_t roomFor(std::uint64_t fileSize) {
-  return std::max(kRoom, std::min(kRoom + kLargestRatio * fileSize, availableMemoryBytes()));
+  return std::max(kRoom, std::min(mostFor(fileSize), availableMemoryBytes()));
+}
+
+/// A tree, and what watches the memory that it was read into until that is freed.
+struct WatchedTree {
+  std::shared_ptr<const HeapWatch> heap;
+  openvdb::TreeBase::Ptr tree;  // goes first
+};
+
+void watchTrees(const std::vector<Grid>& grids) {
+  const auto heap = std::make_shared<const HeapWatch>();
+  for (const Grid& grid : grids) {
+    const auto watched =
+        std::make_shared<WatchedTree>(WatchedTree{heap, grid.base()->baseTreePtr()});
+    grid.base()->setTree(openvdb::TreeBase::Ptr(watched, watched->tree.get()));
+  }
 }
 
 void load(const VdbContents& contents, VdbFile& result) {
@@ -76,10 +96,16 @@ VdbFile readVdb(const std::filesystem::path& path) {
     const CrashGuard guard(path);
     const AddressRoom room(roomFor(contents.fileSize));
     load(contents, result);
+    watchTrees(result.grids);
     checkTransforms(result);
   } catch (const Error&) {
     throw;
   } catch (const std::bad_alloc&) {
+    if (freeAddresses() < mostFor(contents.fileSize))
+      throw MemoryError(
+          fmt::format("{}: memory ran out while reading it ({} are left of its "
+                      "limit); raise that (ulimit -v)",
+                      result.path, formatBytes(freeAddresses())));
     throw InputError(
         result.path,
         fmt::format("asks for more memory than there is, or than its bytes can stand for ({} free, "

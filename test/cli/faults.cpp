@@ -2,6 +2,7 @@
 // colour configs, no terminal, other locales. Each command says which file and what to do, ends
 // with the documented code, and leaves nothing partial.
 
+#include <signal.h>
 #include <unistd.h>
 
 #include <nlohmann/json.hpp>
@@ -275,6 +276,53 @@ const FaultCase kMemory[] = {
      {"--particles", "fewer than"}},
 };
 INSTANTIATE_TEST_SUITE_P(Memory, FaultTable, ::testing::ValuesIn(kMemory), nameOf);
+
+/// The limit of addresses, from where the libraries cannot be loaded to where all goes well. What
+/// ends in between ends for want of memory or threads, and says so of no file that it is damaged.
+class AddressLimit : public Faults, public ::testing::WithParamInterface<const char*> {};
+
+TEST_P(AddressLimit, IsNoDamage) {
+  if (kSanitized) GTEST_SKIP() << "the sanitizer reserves terabytes";
+  constexpr int kNotLoaded = 127;
+  std::set<int> codes;
+  for (int kib = 60'000; kib <= 600'000 && !codes.count(0); kib += 2'000) {
+    const std::string command = fmt::format("ulimit -v {}; {}", kib, GetParam());
+    const RunResult result = shell(command);
+    codes.insert(result.exitCode);
+    EXPECT_TRUE(result.exitCode == 0 || result.exitCode == 5 || result.exitCode == kNotLoaded)
+        << command << ": " << result.exitCode << '\n'
+        << result.err;
+    EXPECT_EQ((result.out + result.err).find("damaged"), std::string::npos) << command << '\n'
+                                                                            << result.err;
+  }
+  EXPECT_TRUE(codes.count(0) && codes.count(5));
+}
+
+INSTANTIATE_TEST_SUITE_P(Commands, AddressLimit,
+                         ::testing::Values("$P inspect smoke.0001.vdb",
+                                           "$P convert smoke.0001.vdb -o x.vdb --particles 500",
+                                           "$P render scene.toml -o x.exr --frames 1 -j2"),
+                         [](const auto& test) {
+                           const std::string command = test.param;
+                           return command.substr(3, command.find(' ', 3) - 3);
+                         });
+
+TEST_F(Faults, TheLimitOfAddressesBoundsTheBudget) {
+  if (kSanitized) GTEST_SKIP() << "the sanitizer reserves terabytes";
+  expectFailure("ulimit -v 1000000; $P render scene.toml -o x.exr --frames 2 --res 4096x4096", 5,
+                {"scene.toml: frame 2 needs about", "lower the resolution"});
+}
+
+/// While it follows paths, long after the smoke was read.
+TEST_F(Faults, AnAbortFromOutsideBlamesNoFile) {
+  const RunResult result = shell(
+      "$P render scene.toml -o x.exr --frames 1 --res 256x256 --checkpoint-interval 0.1 "
+      "-s estimator.type=path_traced -s estimator.samples=100000 & n=0; while [ -z \"$(ls "
+      "x.exr.checkpoint 2>&-)\" ] && [ $n -lt 3000 ]; do sleep 0.01; n=$((n+1)); done; "
+      "kill -s ABRT $!; wait $!");
+  EXPECT_EQ(result.exitCode, 128 + SIGABRT) << result.err;
+  EXPECT_EQ(result.err.find("damaged"), std::string::npos) << result.err;
+}
 
 // Before hours of work, not after: these scenes would take them.
 const FaultCase kColour[] = {

@@ -31,13 +31,14 @@ struct VdbFile {
 /// Reads a whole .vdb file. The file is checked first (descriptor walk: magic, version, grid count,
 /// offsets inside the file), then read without delayed loading, with a guard that turns an abort or
 /// a crash of the library into a message and exit 4 (ARCHITECTURE.md, Errors).
-/// @throws InputMissingError, InputError
+/// @throws InputMissingError, InputError; MemoryError where the process's own limit is used up
 VdbFile readVdb(const std::filesystem::path& path);
 
 /// Whether readVdb would read the file, found out in a child process under limits of memory (4 GiB
 /// and 128 times the file's size) and CPU seconds (20 and one for each 10 MB), so that a damaged
 /// file can hurt nothing. Call it from a process whose other threads are idle: it forks.
 /// @param reason  why not, with the file's name; empty when true
+/// @throws MemoryError where the process's own limit of memory is tighter, and used up
 bool probeVdb(const std::filesystem::path& path, std::string& reason);
 
 /// Writes grids as one .vdb, whole or not at all: by OpenVDB's archive on a stream that throws on a

@@ -98,8 +98,8 @@ int runConvert(Options& options) {
   caches::formatForWriting(options.output);
   const std::vector<std::int64_t> frames = chooseFrames(options);
   checkOutputPattern(options.output, frames.size());
-  return runFrames(frames, options.frames.keepGoing,
-                   [&](std::int64_t frame) { runFrame(options, frame); });
+  return runFrames(fmt::format("{}", fmt::join(options.inputs, " + ")), frames,
+                   options.frames.keepGoing, [&](std::int64_t frame) { runFrame(options, frame); });
 }
 
 std::function<int()> declareConvert(CLI::App& app) {

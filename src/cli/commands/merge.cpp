@@ -62,7 +62,7 @@ int runMerge(const Options& options) {
   const std::vector<std::int64_t> frames = frameList(options);
   checkOutputPattern(options.output, frames.size());
   StatsFile stats(options.stats, frames.size());
-  return runFrames(frames, options.frames.keepGoing, [&](std::int64_t frame) {
+  return runFrames(options.output, frames, options.frames.keepGoing, [&](std::int64_t frame) {
     const std::string path = framePath(options.output, frame);
     if (options.frames.skipExisting && vdbIsComplete(path))
       return printLine("frame {}: {} exists and is complete, skipped", frame, path);

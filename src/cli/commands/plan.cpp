@@ -53,18 +53,19 @@ int runPlan(const Options& options) {
   scene::SceneFile empty = scene;
   empty.volumes.clear();
   std::vector<std::string> objects;
-  const int code = runFrames(frames, options.scene.frames.keepGoing, [&](std::int64_t frame) {
-    scene::RenderRequest request;
-    request.allowStale = options.scene.allowStale;
-    std::int64_t cacheFrame = frame;
-    const bool smoke = cacheFrames.map(frame, cacheFrame);
-    if (cacheFrame != frame) request.cacheFrame = cacheFrame;
-    const scene::FramePlan plan = scene::planScene(smoke ? scene : empty, frame, request);
-    if (options.json)
-      objects.push_back(scene::planJson(plan));
-    else
-      printText(plan);
-  });
+  const int code = runFrames(
+      options.scene.scene, frames, options.scene.frames.keepGoing, [&](std::int64_t frame) {
+        scene::RenderRequest request;
+        request.allowStale = options.scene.allowStale;
+        std::int64_t cacheFrame = frame;
+        const bool smoke = cacheFrames.map(frame, cacheFrame);
+        if (cacheFrame != frame) request.cacheFrame = cacheFrame;
+        const scene::FramePlan plan = scene::planScene(smoke ? scene : empty, frame, request);
+        if (options.json)
+          objects.push_back(scene::planJson(plan));
+        else
+          printText(plan);
+      });
   if (options.json && objects.size() == 1)
     printLine("{}", objects.front());
   else if (options.json)

@@ -105,8 +105,9 @@ int renderFrames(const scene::SceneFile& scene, const scene::FrameWriter& writer
     const bool reached = renderOne(smoke ? scene : empty, frame, options, request, writer, stats);
     job.finished(frame, !reached);
   };
-  const int code =
-      job.run([&] { return runFrames(frames, options.scene.frames.keepGoing, render); });
+  const int code = job.run([&] {
+    return runFrames(options.scene.scene, frames, options.scene.frames.keepGoing, render);
+  });
   if (code != static_cast<int>(ExitCode::ok) || !job.missed()) return code;
   return static_cast<int>(ExitCode::accuracy);
 }

@@ -79,7 +79,9 @@ int traceFrames(const scene::SceneFile& scene, const Options& options) {
     traceOne(scene, frame, options, request, stats);
     job.finished(frame);
   };
-  return job.run([&] { return runFrames(frames, options.scene.frames.keepGoing, trace); });
+  return job.run([&] {
+    return runFrames(options.scene.scene, frames, options.scene.frames.keepGoing, trace);
+  });
 }
 
 int runTrace(Options& options) {

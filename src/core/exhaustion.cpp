@@ -1,0 +1,74 @@
+#include "photosphere/core/exhaustion.h"
+
+#include <signal.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <cstring>
+#include <exception>
+#include <new>
+#include <system_error>
+
+#include "photosphere/core/error.h"
+#include "photosphere/core/output_file.h"
+
+namespace photosphere {
+
+namespace {
+
+std::terminate_handler g_otherwise = nullptr;
+
+void print(const char* text) {
+  const ssize_t ignored = write(STDERR_FILENO, text, std::strlen(text));
+  static_cast<void>(ignored);
+}
+
+// Takes no memory: there may be none.
+[[noreturn]] void onTerminate() {
+  removeTemporaries();
+  if (const Resource lacking = exhausted(); lacking != Resource::none) {
+    print("photosphere: error: ");
+    print(remedyFor(lacking));
+    print("\n");
+    _exit(static_cast<int>(ExitCode::memory));
+  }
+  // An exception is no heap that a file has damaged, which a handler of SIGABRT may stand for.
+  signal(SIGABRT, SIG_DFL);
+  if (g_otherwise) g_otherwise();
+  std::abort();
+}
+
+}  // namespace
+
+Resource exhausted() noexcept {
+  const std::exception_ptr cause = std::current_exception();
+  if (!cause) return Resource::none;
+  try {
+    std::rethrow_exception(cause);
+  } catch (const std::bad_alloc&) {
+    return Resource::memory;
+  } catch (const std::system_error& error) {
+    if (error.code() == std::errc::resource_unavailable_try_again) return Resource::threads;
+    if (error.code() == std::errc::not_enough_memory) return Resource::memory;
+  } catch (const std::exception& error) {
+    // TBB says it in words alone.
+    if (std::strstr(error.what(), "pthread_create has failed")) return Resource::threads;
+  } catch (...) {
+  }
+  return Resource::none;
+}
+
+const char* remedyFor(Resource resource) noexcept {
+  if (resource == Resource::threads)
+    return "no more threads can be started; use fewer (-j), or raise the limits of processes "
+           "(ulimit -u) and of memory (ulimit -v)";
+  return "memory ran out; free some or raise its limit (ulimit -v), or use fewer pixels, photons, "
+         "particles or voxels";
+}
+
+void installTerminateHandler() noexcept {
+  const std::terminate_handler before = std::set_terminate(onTerminate);
+  if (before != onTerminate) g_otherwise = before;
+}
+
+}  // namespace photosphere
