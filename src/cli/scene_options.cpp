@@ -143,6 +143,27 @@ bool CacheFrames::map(std::int64_t frame, std::int64_t& cacheFrame) const {
   return !m_hold || mapFrame(cacheFrame, m_first, m_last, *m_hold, cacheFrame);
 }
 
+JobFiles filesRead(const scene::SceneFile& scene, const std::vector<std::int64_t>& frames,
+                   const CacheFrames& cacheFrames) {
+  std::vector<std::int64_t> ofCaches;
+  std::int64_t cacheFrame = 0;
+  for (const std::int64_t frame : frames)
+    if (cacheFrames.map(frame, cacheFrame)) ofCaches.push_back(cacheFrame);
+  JobFiles files;
+  files.reads("the scene", scene.path);
+  for (std::size_t i = 0; i < scene.volumes.size(); ++i)
+    files.reads(fmt::format("volume.{}.file", i),
+                scene.resolvePath(scene.volumes[i].values.text("file")), ofCaches);
+  for (std::size_t i = 0; i < scene.lights.size(); ++i) {
+    const ParamValues& light = scene.lights[i].values;
+    if (light.given("file"))
+      files.reads(fmt::format("light.{}.file", i), scene.resolvePath(light.text("file")));
+  }
+  files.reads("camera.file", scene.resolvePath(scene.camera.text("file")));
+  files.reads("estimator.cache", scene.resolvePath(scene.estimator.text("cache")), frames);
+  return files;
+}
+
 ResumableJob resumableJob(const scene::SceneFile& scene, const SceneOptions& options,
                           const std::string& more, const std::vector<std::int64_t>& frames,
                           const std::string& output) {

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "job_files.h"
 #include "options.h"
 #include "photosphere/core/frames.h"
 #include "photosphere/scene/pipeline.h"
@@ -53,6 +54,10 @@ class CacheFrames {
   std::int64_t m_offset = 0, m_first = 0, m_last = 0;
   std::optional<CacheHold> m_hold;
 };
+
+/// All that a scene reads at these frames: itself, caches, camera, pictures, stored light.
+JobFiles filesRead(const scene::SceneFile& scene, const std::vector<std::int64_t>& frames,
+                   const CacheFrames& cacheFrames);
 
 /// The job that makes these frames. @param more  what decides its outputs beside the scene
 ResumableJob resumableJob(const scene::SceneFile& scene, const SceneOptions& options,

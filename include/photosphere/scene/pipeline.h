@@ -118,6 +118,8 @@ class FrameWriter {
   /// Sets statistics.seconds.write and adds it to the total.
   /// @throws ConfigError for unknown layers; OutputError
   void write(FrameResult& result) const;
+  /// Path of the colour config.
+  const std::string& colorConfig() const { return m_config.source(); }
 
  private:
   WriteRequest m_request;

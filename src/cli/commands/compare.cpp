@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "command.h"
+#include "job_files.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/log.h"
 #include "photosphere/image/exr.h"
@@ -143,6 +144,11 @@ bool withinTolerance(const image::ImageComparison& comparison, const Options& op
 }
 
 int runCompare(const Options& options) {
+  JobFiles files;
+  files.reads("IMAGE", options.image);
+  files.reads("REFERENCE", options.reference);
+  files.reads("--second-reference", options.secondReference);
+  files.writes("--error-map", options.errorMap);
   const image::Image test = image::readExr(options.image).image;
   const image::Image reference = image::readExr(options.reference).image;
   std::optional<image::Image> second;

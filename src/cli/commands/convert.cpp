@@ -9,6 +9,7 @@
 #include "command.h"
 #include "convert_frame.h"
 #include "frame_loop.h"
+#include "job_files.h"
 #include "options.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/frames.h"
@@ -98,6 +99,10 @@ int runConvert(Options& options) {
   caches::formatForWriting(options.output);
   const std::vector<std::int64_t> frames = chooseFrames(options);
   checkOutputPattern(options.output, frames.size());
+  JobFiles files;
+  for (const std::string& path : options.inputs)
+    files.reads("IN", path, frames);
+  files.writes("-o", options.output, frames);
   return runFrames(fmt::format("{}", fmt::join(options.inputs, " + ")), frames,
                    options.frames.keepGoing, [&](std::int64_t frame) { runFrame(options, frame); });
 }

@@ -7,6 +7,7 @@
 
 #include "command.h"
 #include "frame_loop.h"
+#include "job_files.h"
 #include "options.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/frames.h"
@@ -61,6 +62,11 @@ int runMerge(const Options& options) {
     throw ConfigError(options.output + ": a light cache is written as .vdb");
   const std::vector<std::int64_t> frames = frameList(options);
   checkOutputPattern(options.output, frames.size());
+  JobFiles files;
+  for (const std::string& shard : options.shards)
+    files.reads("SHARD", shard, frames);
+  files.writes("-o", options.output, frames);
+  files.writes("--stats", options.stats, frames);
   StatsFile stats(options.stats, frames.size());
   return runFrames(options.output, frames, options.frames.keepGoing, [&](std::int64_t frame) {
     const std::string path = framePath(options.output, frame);

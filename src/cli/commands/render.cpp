@@ -70,12 +70,24 @@ bool renderOne(const scene::SceneFile& scene, std::int64_t frame, Options& optio
   return !s.targetMissed;
 }
 
+/// @throws ConfigError where a frame would be written over what the job reads, or over another file
+void checkOverwriting(const scene::SceneFile& scene, const scene::FrameWriter& writer,
+                      const Options& options, const std::vector<std::int64_t>& frames,
+                      const CacheFrames& cacheFrames) {
+  JobFiles files = filesRead(scene, frames, cacheFrames);
+  files.reads("the OCIO config", writer.colorConfig());
+  files.writes(options.output.empty() ? "output.file" : "-o", options.write.path, frames);
+  files.writes("the preview", options.write.preview, frames);
+  files.writes("--stats", options.scene.stats, frames);
+}
+
 int renderFrames(const scene::SceneFile& scene, const scene::FrameWriter& writer,
                  Options& options) {
   const std::vector<std::int64_t> frames = sceneFrameList(scene, options.scene);
   checkOutputPattern(options.write.path, frames.size());
   if (!options.write.preview.empty()) checkOutputPattern(options.write.preview, frames.size());
   const CacheFrames cacheFrames(scene, options.scene);
+  checkOverwriting(scene, writer, options, frames, cacheFrames);
   scene::SceneFile empty = scene;
   empty.volumes.clear();
   StatsFile stats(options.scene.stats, frames.size());

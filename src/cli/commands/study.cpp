@@ -8,6 +8,7 @@
 
 #include "command.h"
 #include "frame_loop.h"
+#include "job_files.h"
 #include "options.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/frames.h"
@@ -62,9 +63,20 @@ void complete(Options& options) {
   s.sets.push_back(fmt::format("camera.resolution=[{}, {}]", size[0], size[1]));
 }
 
+// Before the work, not after it.
+void checkReport(const study::StudyOptions& s, std::initializer_list<const char*> names) {
+  JobFiles files;
+  files.reads("SCENE", s.scene.string());
+  files.reads("--ocio", s.ocioConfig);
+  for (const char* name : names) {
+    const std::string path = (s.output / name).string();
+    files.writes("the report's file", path);
+    checkWritable(path);
+  }
+}
+
 int reportPaper(const study::StudyOptions& s) {
-  for (const char* file : {"paper.csv", "paper.json", "index.html"})
-    checkWritable((s.output / file).string());
+  checkReport(s, {"paper.csv", "paper.json", "index.html"});
   const study::PaperResult result = study::runPaper(s);
   study::writePaperReport(result, s);
   printLine("{}: {} exhibits, {:.1f} s", (s.output / "index.html").string(), result.exhibits.size(),
@@ -73,10 +85,8 @@ int reportPaper(const study::StudyOptions& s) {
 }
 
 int reportSweeps(const study::StudyOptions& s) {
-  // Before the work, not after it.
   study::gnuplotVersion();
-  for (const char* file : {"study.csv", "study.json", "index.html"})
-    checkWritable((s.output / file).string());
+  checkReport(s, {"study.csv", "study.json", "index.html"});
   const study::StudyResult result = study::runStudy(s);
   study::writeReport(result, s);
   std::size_t points = 0;

@@ -53,6 +53,9 @@ int traceFrames(const scene::SceneFile& scene, const Options& options) {
   const std::vector<std::int64_t> frames = sceneFrameList(scene, options.scene);
   checkOutputPattern(options.output, frames.size());
   const CacheFrames cacheFrames(scene, options.scene);
+  JobFiles files = filesRead(scene, frames, cacheFrames);
+  files.writes("-o", options.output, frames);
+  files.writes("--stats", options.scene.stats, frames);
   StatsFile stats(options.scene.stats, frames.size());
   bool planned = false;
   ResumableJob job =
