@@ -128,7 +128,11 @@ ParamValue coerce(const Param& row, ParamValue value, const std::string& where) 
       checkText(row, std::get<std::string>(value), where);
       return value;
     case ParamType::list:
-      if (std::holds_alternative<std::vector<std::string>>(value)) return value;
+      if (const auto* items = std::get_if<std::vector<std::string>>(&value)) {
+        for (const std::string& item : *items)
+          checkText(row, item, where);
+        return value;
+      }
       if (const auto* numbers = std::get_if<std::vector<double>>(&value);
           numbers && numbers->empty())
         return std::vector<std::string>();
@@ -226,7 +230,7 @@ ParamValue parseParam(const Param& row, std::string_view text, const std::string
         item = item.substr(1, item.size() - 2);
       if (!item.empty()) items.emplace_back(item);
     }
-    return items;
+    return coerce(row, items, where);
   }
   std::vector<double> numbers;
   for (const std::string_view item : split(inner, ',')) {

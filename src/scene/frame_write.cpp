@@ -4,9 +4,7 @@
 
 #include <algorithm>
 
-#include "photosphere/core/error.h"
 #include "photosphere/core/frames.h"
-#include "photosphere/core/registry.h"
 #include "photosphere/core/resources.h"
 #include "photosphere/core/version.h"
 #include "photosphere/scene/plan.h"
@@ -83,14 +81,10 @@ image::ExrAttributes header(const FrameResult& result,
 }  // namespace
 
 image::Image frameImage(const FrameResult& result, const std::vector<std::string>& aovs) {
-  const std::vector<std::string_view> present(result.layerNames.begin(), result.layerNames.end());
-  for (const std::string& name : aovs)
-    if (std::find(present.begin(), present.end(), name) == present.end())
-      throw ConfigError(fmt::format("[output]: aovs: this frame has no layer '{}'{} (it has: {})",
-                                    name, suggestion(name, present), fmt::join(present, ", ")));
+  ParamValues(outputParams()).set("aovs", aovs, "[output]");  // refuses what is no layer
+  const std::vector<std::string>& names = aovs.empty() ? result.layerNames : aovs;
   const auto wanted = [&](std::string_view name) {
-    return std::find(present.begin(), present.end(), name) != present.end() &&
-           (aovs.empty() || std::find(aovs.begin(), aovs.end(), name) != aovs.end());
+    return std::find(names.begin(), names.end(), name) != names.end();
   };
   const render::FrameLayers& layers = result.layers;
   image::Image out = emptyImage(layers);

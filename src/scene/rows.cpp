@@ -478,7 +478,9 @@ std::span<const Param> outputParams() {
        .type = ParamType::list,
        .unit = "",
        .defaultText = "[]",
-       .help = "layers to write; empty = every layer the frame has"},
+       .help = "layers to write, zeros where a frame has nothing in one; empty = every layer the "
+               "frame has",
+       .choices = "beauty|single|multiple|emission|background|transmittance|depth|error"},
       {.name = "light_groups",
        .type = ParamType::boolean,
        .unit = "",

@@ -313,6 +313,13 @@ void checkCombinations(const SceneFile& scene, const std::string& name) {
   if (target && e.text("type") == "photon_map" && e.integer("passes") > 1)
     throw ConfigError(name +
                       ": [render]: 'target_error' goes on by itself; leave estimator.passes at 1");
+  // Zeros would say that there is no error.
+  const std::vector<std::string> aovs = scene.output.list("aovs");
+  if (!target && !(scene.render.real("time_limit") > 0) &&
+      std::find(aovs.begin(), aovs.end(), "error") != aovs.end())
+    throw ConfigError(name +
+                      ": [output]: the layer 'error' of 'aovs' is estimated under "
+                      "render.target_error or render.time_limit alone; set one of them");
   const double limit = scene.render.real("memory_limit");
   if (limit < 0 && limit != -1)
     throw ConfigError(name +

@@ -134,6 +134,7 @@ std::vector<std::string> neutralSettings(const scene::SceneFile& scene) {
       sets.push_back(fmt::format("estimator.{}={}", row.name, defaults.format(row.name)));
   for (const char* name : {"target_error", "time_limit"})
     if (scene.render.real(name) > 0) sets.push_back(fmt::format("render.{}=0", name));
+  if (scene.output.given("aovs")) sets.emplace_back("output.aovs=[]");  // `error` needs a target
   return sets;
 }
 

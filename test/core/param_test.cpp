@@ -22,6 +22,7 @@ constexpr Param kRows[] = {
     {"colour", ParamType::rgb, "", "[1, 2, 3]", "what colour"},
     {"later", ParamType::boolean, "", "false", "not yet", 0, 0, {}, {}, false},
     {"names", ParamType::list, "", "[]", "several"},
+    {"parts", ParamType::list, "", "[]", "some", 0, 0, "head|tail"},
 };
 
 std::string messageOf(const std::function<void()>& call) {
@@ -62,6 +63,11 @@ TEST(Params, ErrorsNameKeyPlaceAndRemedy) {
   EXPECT_NE(messageOf([&] { v.setText("scale", "nan", "w"); }).find("finite"), std::string::npos);
   EXPECT_NE(messageOf([&] { v.setText("mode", "fency", "w"); }).find("did you mean 'fancy'"),
             std::string::npos);
+  EXPECT_NE(messageOf([&] {
+              v.setText("parts", "[\"head\", \"tale\"]", "w");
+            }).find("w: 'parts' = 'tale' is unknown; did you mean 'tail'? (known: head, tail)"),
+            std::string::npos);
+  EXPECT_EQ(messageOf([&] { v.set("parts", std::vector<std::string>{"tail", "head"}, "w"); }), "");
   EXPECT_NE(messageOf([&] { v.setText("mode", "later", "w"); }).find("not served"),
             std::string::npos);
   EXPECT_NE(messageOf([&] { v.setText("later", "true", "w"); }).find("not served"),

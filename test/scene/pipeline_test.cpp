@@ -443,6 +443,26 @@ TEST_F(PipelineTest, AovsAreSelectedByName) {
   EXPECT_TRUE(contains(message, "did you mean 'beauty'?")) << message;
 }
 
+// A sequence has the same channels throughout, whatever a frame's smoke does.
+TEST_F(PipelineTest, ALayerThatTheFrameLacksIsZeros) {
+  const FrameResult r = renderScene(scene(ballScene(ball("v.vdb"), Vec3d(0), 1)), 1);
+  const auto lacks = [&](const std::string& name) {
+    return std::find(r.layerNames.begin(), r.layerNames.end(), name) == r.layerNames.end();
+  };
+  EXPECT_FALSE(frameImage(r, {}).has("emission.R"));
+  for (const std::string name : {"emission", "background", "error"}) {
+    EXPECT_TRUE(lacks(name)) << name;
+    const image::Image some = frameImage(r, {"beauty", name});
+    EXPECT_TRUE(some.has("R"));
+    EXPECT_FALSE(some.has("Z"));
+    for (const char* channel : {".R", ".G", ".B"}) {
+      ASSERT_TRUE(some.has(name + channel)) << name;
+      for (const float value : some.channel(name + channel))
+        EXPECT_EQ(value, 0.0f) << name;
+    }
+  }
+}
+
 TEST_F(PipelineTest, ABareVolumeGetsCameraAndLight) {
   const std::string path = ball("bare.vdb", Vec3d(10, 20, 30), 2.0);
   const SceneFile s =

@@ -172,6 +172,9 @@ TEST(SceneFileTest, UnknownKeysNameFileLineAndTheKnownOnes) {
                        "'width' is an option of camera type orthographic, not of perspective"));
   EXPECT_TRUE(contains(complaint([] { parse("[camera]\nresolution = [10.5, 3]\n"); }), "whole"));
   EXPECT_TRUE(contains(complaint([] { parse("[render]\nsamples = 0\n"); }), "at least 1"));
+  EXPECT_TRUE(
+      contains(complaint([] { parse("[output]\naovs = [\"beauty\", \"singel\"]\n"); }),
+               "shot.toml:2: [output]: 'aovs' = 'singel' is unknown; did you mean 'single'?"));
 }
 
 class NotServedTest : public ::testing::TestWithParam<const char*> {};
@@ -208,6 +211,10 @@ TEST(SceneFileTest, CombinationsThatMeanNothingAreRefused) {
   EXPECT_NE(complaint([] { parse("[estimator]\ncache = \"a.vdb\"\nbasis = \"view\"\n"); }), "");
   EXPECT_NE(complaint([] { parse("[estimator]\ncache = \"a.vdb\"\ntype = \"single\"\n"); }), "");
   EXPECT_NE(complaint([] { parse("[render]\nmemory_limit = -0.5\n"); }), "");
+  const std::string layer = "[output]\naovs = [\"beauty\", \"error\"]\n";
+  EXPECT_TRUE(contains(complaint([&] { parse(layer); }), "render.target_error"));
+  for (const char* set : {"render.target_error=0.1", "render.time_limit=60"})
+    EXPECT_EQ(parse(layer, {set}).output.list("aovs").size(), 2u) << set;
 }
 
 TEST(SceneFileTest, SetsOverrideAndCreate) {

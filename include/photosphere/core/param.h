@@ -23,7 +23,7 @@ enum class ParamType {
   vec2,    ///< [x, y]
   vec3,    ///< [x, y, z]
   matrix,  ///< 16 numbers, row-major, column vectors
-  list,    ///< array of text
+  list,    ///< array of text, or of some of `choices`
 };
 
 /// One option. All text is constant and in English; `unit` is empty for pure numbers.
@@ -36,7 +36,7 @@ struct Param {
   std::string_view help = {};
   double min = -std::numeric_limits<double>::infinity();
   double max = std::numeric_limits<double>::infinity();
-  std::string_view choices = {};   ///< `a|b|c`, empty = free
+  std::string_view choices = {};   ///< `a|b|c`, of a list its items'; empty = free
   std::string_view unserved = {};  ///< choices known to the contract that this version lacks
   bool served = true;  ///< false: any value but the default is refused as not served yet
 };

@@ -105,7 +105,8 @@ struct WriteRequest {
 };
 
 /// Layers as image channels: R, G, B, A for `beauty`, `single.R`..., `Z` for `depth`.
-/// @param aovs  names from `layerNames`; empty = all. @throws ConfigError for others
+/// @param aovs  names of output.aovs, of which those that the frame lacks are zeros; empty = all of
+///              `layerNames`. @throws ConfigError for others
 image::Image frameImage(const FrameResult& result, const std::vector<std::string>& aovs);
 
 /// Writes the frames of a scene as EXR and preview.
@@ -116,7 +117,7 @@ class FrameWriter {
   /// @throws ConfigError, InputMissingError, InputError
   FrameWriter(const SceneFile& scene, WriteRequest request);
   /// Sets statistics.seconds.write and adds it to the total.
-  /// @throws ConfigError for unknown layers; OutputError
+  /// @throws OutputError
   void write(FrameResult& result) const;
   /// Path of the colour config.
   const std::string& colorConfig() const { return m_config.source(); }
