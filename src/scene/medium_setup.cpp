@@ -228,6 +228,7 @@ void buildMedium(const SceneFile& scene, std::int64_t cacheFrame, bool wantParti
   setup.medium = std::make_unique<transport::Medium>(std::move(placed), shutter);
   // Active voxels may hold zeros: what frames the smoke is the box of what scatters or emits.
   setup.worldBounds = worldBoundsOf(*setup.medium, setup.space);
+  setup.hasSmoke = !setup.worldBounds.empty();
   setup.readSeconds += watch.seconds();
 }
 

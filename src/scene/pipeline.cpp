@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "aim.h"
+#include "black_frame.h"
 #include "frame_batches.h"
 #include "light_stage.h"
 #include "photosphere/core/error.h"
@@ -158,6 +159,9 @@ FrameResult renderScene(const SceneFile& written, std::int64_t frame,
   result.notes = setup.notes;
   finish(setup, cpuBefore, result);
   checkSamples(result.layers);
+  // Without volumes the frame is asked for without smoke.
+  if (!scene.volumes.empty() && isBlack(result.layers))
+    result.warnings.push_back("the frame is black: " + whyBlack(scene, setup, result.layers));
   result.statistics.seconds.total += total.seconds();
   return result;
 }

@@ -190,6 +190,11 @@ SceneFile loadScene(const std::filesystem::path& path, const std::vector<std::st
   const std::filesystem::path folder = std::filesystem::absolute(path).parent_path();
   SceneFile scene = parseScene(text.str(), path.string(), folder, sets);
   scene.path = path.string();
+  // An empty file is no scene of nothing: it was cut off, or never written.
+  if (scene.volumes.empty())
+    throw ConfigError(scene.path +
+                      ": there is no [[volume]]; a scene needs one, whose 'file' names "
+                      "its cache");
   return scene;
 }
 

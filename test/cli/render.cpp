@@ -121,7 +121,20 @@ TEST_F(Render, MapsFramesToThoseOfTheCache) {
       render({"scene.toml", "-o", "x.####.exr", "--frames", "6", "--cache-hold", "clip"});
   ASSERT_EQ(clip.exitCode, 0) << clip.err;
   EXPECT_EQ(mean("x.0006.exr"), 0);
+  EXPECT_EQ(clip.err.find("warning"), std::string::npos) << clip.err;  // it was asked for
   EXPECT_EQ(render({"scene.toml", "-o", "x.####.exr", "--frames", "7"}).exitCode, 3);
+}
+
+TEST_F(Render, WarnsOfABlackFrame) {
+  std::vector<std::string> dark{"scene.toml", "-o", "x.exr", "--frames", "1", "-s", "light=[]"};
+  RunResult result = render(dark);
+  EXPECT_EQ(result.exitCode, 0) << result.err;
+  EXPECT_NE(result.err.find("warning: frame 1: the frame is black: there is no light"),
+            std::string::npos)
+      << result.err;
+  EXPECT_EQ(mean("x.exr"), 0);
+  dark.emplace_back("-q");
+  EXPECT_EQ(render(dark).err, "");
 }
 
 TEST_F(Render, OverridesResolutionAndCrops) {
@@ -254,6 +267,7 @@ class Refusals : public Render, public ::testing::WithParamInterface<Refusal> {}
 
 TEST_P(Refusals, SayWhyAndLeaveNothing) {
   writeText(m_folder / "typo.toml", "[camera]\nfof = 30\n[[volume]]\nfile = \"smoke.0001.vdb\"\n");
+  writeText(m_folder / "empty.toml", "");
   fs::create_symlink("/dev/full", m_folder / "full.exr");
   fs::create_directory(m_folder / "folder.exr");
   const auto before = namesIn(m_folder.path());
@@ -266,6 +280,10 @@ TEST_P(Refusals, SayWhyAndLeaveNothing) {
 
 const Refusal kRefusals[] = {
     {"SceneMissing", {"render", "none.toml", "-o", "x.exr"}, 3, "none.toml"},
+    {"SceneEmpty",
+     {"render", "empty.toml", "-o", "x.exr"},
+     2,
+     "empty.toml: there is no [[volume]]"},
     {"UnknownKey", {"render", "typo.toml", "-o", "x.exr"}, 2, "typo.toml:2"},
     {"UnknownSetKey", {"render", "scene.toml", "-o", "x.####.exr", "-s", "camera.fof=3"}, 2, "fof"},
     {"SetWithoutValue", {"render", "scene.toml", "-o", "x.####.exr", "-s", "camera"}, 2, "--set"},

@@ -328,6 +328,18 @@ TEST(SceneFileTest, AMissingFileIsNamedWithTheRemedy) {
                        "nothere.toml: no such file; check its path"));
 }
 
+TEST(SceneFileTest, AFileWithoutAVolumeIsRefused) {
+  const TemporaryFolder folder;
+  writeText(folder / "empty.toml", "");
+  writeText(folder / "light.toml", "[[light]]\ntype = \"point\"\n");
+  for (const char* name : {"empty.toml", "light.toml"}) {
+    const std::string message = complaint([&] { loadScene(folder / name); });
+    EXPECT_TRUE(contains(message, name)) << message;
+    EXPECT_TRUE(contains(message, "there is no [[volume]]")) << message;
+  }
+  EXPECT_EQ(loadScene(folder / "empty.toml", {"volume.0.file=a.vdb"}).volumes.size(), 1u);
+}
+
 TEST(SceneFileTest, PathsAreRelativeToTheFile) {
   const TemporaryFolder folder;
   std::filesystem::create_directory(folder / "shots");

@@ -45,7 +45,8 @@ struct FrameSetup {
   std::string path;  ///< of the scene file, or of the first cache where there is none: for messages
   std::int64_t frame = 0;
   lights::LocalSpace space;
-  Box3d worldBounds;  ///< of everything that can scatter [scene units]; empty without smoke
+  Box3d worldBounds;      ///< of everything that can scatter [scene units]; empty without smoke
+  bool hasSmoke = false;  ///< something scatters or glows, whether or not the plan leaves it out
   std::unique_ptr<transport::Medium> medium;  ///< never null; may be empty
   transport::LightList lights;
   std::unique_ptr<cameras::Camera> camera;  ///< at the frame

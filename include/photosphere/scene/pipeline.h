@@ -74,6 +74,7 @@ struct FrameResult {
   double radius = 0;      ///< of the spatial kernel, of the first pass [scene units]; 0 without
   std::int64_t seed = 0;
   std::vector<std::string> notes;
+  std::vector<std::string> warnings;  ///< what is hardly meant: that the frame is black
 };
 
 /// A frame that holds what no picture may.

@@ -95,7 +95,8 @@ std::span<const Preset> estimatorPresets();
 /// @throws InputMissingError when the file cannot be opened; ConfigError (`file:line: [table]:
 /// ...`)
 ///         for text that is not TOML, for an unknown table, key or value (listing the known ones),
-///         for values out of range, and for what the contract knows but this version does not serve
+///         for values out of range, for what the contract knows but this version does not serve,
+///         and for a file without a volume
 SceneFile loadScene(const std::filesystem::path& path, const std::vector<std::string>& sets = {});
 
 /// The same from text. @param name  stands for the file in messages

@@ -60,6 +60,8 @@ bool renderOne(const scene::SceneFile& scene, std::int64_t frame, Options& optio
   log::info("frame {}: plan: {}", frame, scene::planLine(result.statistics.effects));
   for (const std::string& note : result.notes)
     log::info("frame {}: {}", frame, note);
+  for (const std::string& warning : result.warnings)
+    log::warning("frame {}: {}", frame, warning);
   const InterruptDelay delay;  // what is rendered is written
   writer.write(result);
   const scene::FrameStatistics& s = result.statistics;
