@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "columns.h"
 #include "inspect_warnings.h"
@@ -151,19 +150,6 @@ InspectReport inspectCache(const fs::path& path) {
 }
 
 namespace {
-
-/// Frames between the first and last that the common step of the others would reach.
-std::vector<std::int64_t> missingFrames(const std::vector<std::int64_t>& frames) {
-  std::int64_t step = 0;
-  for (std::size_t i = 1; i < frames.size(); ++i)
-    step = std::gcd(step, frames[i] - frames[i - 1]);
-  std::vector<std::int64_t> holes;
-  for (std::size_t i = 1; i < frames.size() && step > 0; ++i)
-    for (std::int64_t frame = frames[i - 1] + step; frame < frames[i] && holes.size() < 100000;
-         frame += step)
-      holes.push_back(frame);
-  return holes;
-}
 
 /// What one name does over the sequence.
 struct Track {

@@ -24,6 +24,20 @@ void checkOutputPattern(const std::string& output, std::size_t frames) {
                   output, frames, example));
 }
 
+std::vector<std::int64_t> existingFrames(const std::string& pattern) {
+  std::vector<std::int64_t> frames = findFrames(pattern);
+  if (frames.empty())
+    throw InputMissingError(pattern, "no file matches; check the path and its number of #");
+  return frames;
+}
+
+std::vector<std::int64_t> framesByFiles(const std::string& pattern) {
+  std::vector<std::int64_t> frames = existingFrames(pattern);
+  const std::vector<std::int64_t> holes = missingFrames(frames);
+  if (!holes.empty()) log::warning("{}: frames are missing: {}", pattern, formatFrames(holes));
+  return frames;
+}
+
 void checkWritable(const std::string& path) {
   if (path.empty()) return;
   const OutputFile probe(path);  // writes nothing until it is committed

@@ -12,6 +12,12 @@ namespace photosphere::cli {
 /// @throws ConfigError that says to add ####
 void checkOutputPattern(const std::string& output, std::size_t frames);
 
+/// Frames of a sequence of files. @throws InputMissingError when there are none
+std::vector<std::int64_t> existingFrames(const std::string& pattern);
+
+/// The same, to work on where nobody says which frames: warns of those that are missing between.
+std::vector<std::int64_t> framesByFiles(const std::string& pattern);
+
 /// Finds out before the work whether an output can be written: its folder is created, and neither
 /// it nor the target refuses. An empty path is fine. @throws OutputError
 void checkWritable(const std::string& path);

@@ -6,6 +6,7 @@
 #include <array>
 #include <filesystem>
 
+#include "frame_loop.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/log.h"
 #include "photosphere/core/resources.h"
@@ -47,13 +48,6 @@ std::string numberedCache(const scene::SceneFile& scene) {
     if (hasFrameToken(path)) return path;
   }
   return {};
-}
-
-std::vector<std::int64_t> findCacheFrames(const std::string& pattern) {
-  std::vector<std::int64_t> frames = findFrames(pattern);
-  if (frames.empty())
-    throw InputMissingError(pattern, "no file matches; check the path and its number of #");
-  return frames;
 }
 
 }  // namespace
@@ -117,7 +111,7 @@ std::vector<std::int64_t> sceneFrameList(const scene::SceneFile& scene,
   if (!scene.scene.text("frames").empty()) return scene::sceneFrames(scene);
   const std::string pattern = numberedCache(scene);
   if (pattern.empty()) return {1};
-  std::vector<std::int64_t> frames = findCacheFrames(pattern);
+  std::vector<std::int64_t> frames = framesByFiles(pattern);
   for (std::int64_t& frame : frames)
     frame -= options.cacheOffset;
   return frames;
@@ -133,7 +127,7 @@ CacheFrames::CacheFrames(const scene::SceneFile& scene, const SceneOptions& opti
     m_hold.reset();  // one file for all frames: there is no outside
     return;
   }
-  const auto frames = findCacheFrames(pattern);
+  const auto frames = existingFrames(pattern);
   m_first = frames.front();
   m_last = frames.back();
 }

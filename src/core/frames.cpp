@@ -6,6 +6,7 @@
 #include <charconv>
 #include <cstdlib>
 #include <filesystem>
+#include <numeric>
 #include <unordered_map>
 
 #include "photosphere/core/error.h"
@@ -185,6 +186,18 @@ std::vector<std::int64_t> findFrames(std::string_view path) {
   }
   std::sort(frames.begin(), frames.end());
   return frames;
+}
+
+std::vector<std::int64_t> missingFrames(const std::vector<std::int64_t>& frames) {
+  std::int64_t step = 0;
+  for (std::size_t i = 1; i < frames.size(); ++i)
+    step = std::gcd(step, frames[i] - frames[i - 1]);
+  std::vector<std::int64_t> holes;
+  for (std::size_t i = 1; i < frames.size() && step > 0; ++i)
+    for (std::int64_t frame = frames[i - 1] + step; frame < frames[i] && holes.size() < 100000;
+         frame += step)
+      holes.push_back(frame);
+  return holes;
 }
 
 bool mapFrame(std::int64_t frame, std::int64_t first, std::int64_t last, CacheHold hold,

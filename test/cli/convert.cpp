@@ -215,6 +215,22 @@ TEST_F(ConvertSequence, FindsItsFramesAndKeepsTheirVoxelSizes) {
                 0.1 / i, 1e-12);
 }
 
+TEST_F(ConvertSequence, TellsOfFramesThatAreMissing) {
+  const std::string hole = "warning: in.####.vdb: frames are missing: 2";
+  const std::vector<std::string> all{"in.####.vdb", "-o", "x.####.vdb", "--particles", "50"};
+  RunResult result = convert(all);
+  EXPECT_EQ(result.err.find("missing"), std::string::npos) << result.err;
+  fs::rename(m_folder / "in.0002.vdb", m_folder / "in.0004.vdb");
+  result = convert(all);
+  EXPECT_EQ(result.exitCode, 0) << result.err;
+  EXPECT_NE(result.err.find(hole), std::string::npos) << result.err;
+  std::vector<std::string> some = all;
+  some.insert(some.end(), {"--frames", "1,3"});
+  result = convert(some);
+  EXPECT_EQ(result.exitCode, 0) << result.err;
+  EXPECT_EQ(result.err.find("missing"), std::string::npos) << result.err;
+}
+
 TEST_F(ConvertSequence, DeliversTheOtherFramesWhenOneIsBad) {
   truncate(m_folder / "in.0002.vdb");
   RunResult result =

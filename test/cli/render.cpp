@@ -47,6 +47,27 @@ TEST_F(Render, FindsItsFramesByTheCache) {
   EXPECT_FALSE(samePixels("out/x.0001.exr", "out/x.0003.exr"));
 }
 
+TEST_F(Render, TellsOfFramesThatTheCacheLacks) {
+  fs::rename(m_folder / "smoke.0002.vdb", m_folder / "smoke.0004.vdb");
+  const auto count = [](const std::string& text) {
+    const std::string hole = "smoke.####.vdb: frames are missing: 2";
+    std::size_t found = 0;
+    for (std::size_t at = text.find(hole); at != std::string::npos; at = text.find(hole, at + 1))
+      ++found;
+    return found;
+  };
+  const std::vector<std::string> all{"scene.toml",   "-o",     "x.####.exr",
+                                     "--cache-hold", "extend", "--dry-run"};
+  RunResult result = render(all);
+  EXPECT_EQ(result.exitCode, 0) << result.err;
+  EXPECT_EQ(count(result.err), 1u) << result.err;
+  std::vector<std::string> some = all;
+  some.insert(some.end(), {"--frames", "1,3"});
+  result = render(some);
+  EXPECT_EQ(result.exitCode, 0) << result.err;
+  EXPECT_EQ(count(result.err), 0u) << result.err;
+}
+
 TEST_F(Render, TakesFramesFromTheOptionThenTheScene) {
   ASSERT_EQ(render({"scene.toml", "-o", "a.####.exr", "-s", "scene.frames=2-3"}).exitCode, 0);
   EXPECT_FALSE(fs::exists(m_folder / "a.0001.exr"));

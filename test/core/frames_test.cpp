@@ -57,6 +57,18 @@ TEST(Frames, FindsWhatIsThere) {
   EXPECT_EQ(findFrames((folder / "s.####.vdb").string()), Frames({1, 4, 30}));
 }
 
+TEST(Frames, MissesThoseThatTheirStepWouldReach) {
+  const auto missing = [](const std::string& there) {
+    return formatFrames(missingFrames(parseFrames(there)));
+  };
+  EXPECT_EQ(missing("1,2,5"), "3-4");
+  EXPECT_EQ(missing("-2,0,4,10"), "2,6,8");
+  for (const char* whole : {"7", "1-5", "1-9x2", "3,90"})
+    EXPECT_EQ(missing(whole), "") << whole;
+  EXPECT_TRUE(missingFrames({}).empty());
+  EXPECT_EQ(missingFrames({1, 2, 1'000'000'000}).size(), 100'000u);
+}
+
 TEST(Frames, HoldsBeyondTheCache) {
   std::int64_t mapped = 0;
   EXPECT_FALSE(mapFrame(11, 1, 10, CacheHold::clip, mapped));

@@ -26,6 +26,10 @@ std::string framePath(std::string_view path, std::int64_t frame);
 /// Frames for which a file of this pattern exists, in order.
 std::vector<std::int64_t> findFrames(std::string_view path);
 
+/// Frames between the first and the last of a sequence that the common step of the others would
+/// reach, 100,000 of them at most. @param frames  in order
+std::vector<std::int64_t> missingFrames(const std::vector<std::int64_t>& frames);
+
 /// What to do with a frame that lies outside the cache's range.
 enum class CacheHold { clip, extend, repeat, pingpong };
 

@@ -53,10 +53,7 @@ std::vector<std::int64_t> chooseFrames(const Options& options) {
     return parseFrames(options.frames.frames);
   }
   if (numbered == options.inputs.end()) return {1};
-  std::vector<std::int64_t> frames = findFrames(*numbered);
-  if (frames.empty())
-    throw InputMissingError(*numbered, "no file matches; check the path and its number of #");
-  return frames;
+  return framesByFiles(*numbered);
 }
 
 bool isComplete(const std::string& path) {

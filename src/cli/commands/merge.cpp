@@ -30,13 +30,8 @@ struct Options {
 /// --frames, else the frames that the first numbered shard has, else 1.
 std::vector<std::int64_t> frameList(const Options& options) {
   if (!options.frames.frames.empty()) return parseFrames(options.frames.frames);
-  for (const std::string& shard : options.shards) {
-    if (!hasFrameToken(shard)) continue;
-    std::vector<std::int64_t> frames = findFrames(shard);
-    if (frames.empty())
-      throw InputMissingError(shard, "no file matches; check the path and its number of #");
-    return frames;
-  }
+  for (const std::string& shard : options.shards)
+    if (hasFrameToken(shard)) return framesByFiles(shard);
   return {1};
 }
 
