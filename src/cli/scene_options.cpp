@@ -67,7 +67,8 @@ void addPlanOptions(CLI::App& app, SceneOptions& options) {
   app.add_flag("--allow-stale", options.allowStale,
                "Use a light cache that was made for another medium or other lights");
   app.add_flag("--allow-invalid", options.allowInvalid,
-               "Treat NaN, infinite and negative values of caches as zero [exit 4]");
+               "Treat NaN, infinite and negative values of caches and of pictures that light the "
+               "scene as zero [exit 4]");
   app.add_option("--cache-offset", options.cacheOffset,
                  "Frame of the caches minus frame of the picture [0]")
       ->type_name("N")

@@ -23,7 +23,8 @@ namespace {
 [[noreturn]] void failOverflow(std::uint64_t times) {
   throw Error(ExitCode::unspecified,
               fmt::format("{} photon deposits overflowed their 64-bit sums; lower "
-                          "estimator.photons or raise estimator.light_voxel",
+                          "estimator.photons or raise estimator.light_voxel, or lower the lights' "
+                          "intensity where few photons do so",
                           times));
 }
 

@@ -80,6 +80,9 @@ class MappedLight final : public Light {
   bool isDelta() const override { return false; }
   bool isGrey() const override { return m_map.isGrey(); }
   void addContent(Hasher& hasher) const override { m_map.addContent(hasher); }
+  std::string invalidContent() const override {
+    return m_map.invalid().total() > 0 ? m_map.invalid().text() : std::string();
+  }
 
  private:
   static float crossSection(const BoundingSphere& bounds) {

@@ -1,8 +1,12 @@
 #include "environment_map.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
+#include "photosphere/core/error.h"
 #include "photosphere/core/fast_math.h"
 #include "trigonometry.h"
 
@@ -14,18 +18,47 @@ float usable(float value) {
   return std::isfinite(value) && value > 0.0f ? value : 0.0f;
 }
 
+bool isInvalid(float value) {
+  return !std::isfinite(value) || value < 0.0f;
+}
+
+// @return whether the pixel is invalid, and is counted
+bool count(const Rgb& pixel, InvalidPixels& found) {
+  float worst = 0.0f;
+  for (int c = 0; c < 3; ++c) {
+    const bool worse = std::isnan(pixel[c]) || (!std::isnan(worst) && !std::isinf(worst));
+    if (isInvalid(pixel[c]) && worse) worst = pixel[c];
+  }
+  if (!isInvalid(worst)) return false;
+  if (found.total() == 0) found.firstValue = worst;
+  ++(std::isnan(worst) ? found.nans : std::isinf(worst) ? found.infinities : found.negatives);
+  return true;
+}
+
 }  // namespace
 
-EnvironmentMap::EnvironmentMap(const image::Image& image, const Rgb& scale)
-    : m_width(image.width()), m_height(image.height()) {
+std::string InvalidPixels::text() const {
+  return fmt::format("{} NaN, {} infinite and {} negative pixels, the first ({}) at ({}, {})", nans,
+                     infinities, negatives, firstValue, first.x, first.y);
+}
+
+void EnvironmentMap::readPixels(const image::Image& image, const Rgb& scale) {
   const auto red = image.channel("R"), green = image.channel("G"), blue = image.channel("B");
   m_pixels.resize(image.pixelCount());
   for (std::size_t i = 0; i < m_pixels.size(); ++i) {
+    if (count({red[i], green[i], blue[i]}, m_invalid) && m_invalid.total() == 1)
+      m_invalid.first = {static_cast<int>(i % static_cast<std::size_t>(m_width)),
+                         static_cast<int>(i / static_cast<std::size_t>(m_width))};
     m_pixels[i] = scale * Rgb(usable(red[i]), usable(green[i]), usable(blue[i]));
     const Rgb& p = m_pixels[i];
     m_brightest = std::max(m_brightest, maxComponent(p));
     m_grey = m_grey && p.r == p.g && p.g == p.b;
   }
+}
+
+EnvironmentMap::EnvironmentMap(const image::Image& image, const Rgb& scale)
+    : m_width(image.width()), m_height(image.height()) {
+  readPixels(image, scale);
   for (int y = 0; y <= m_height; ++y)
     m_latitudes.push_back(1.0 - oneMinusCos(kPi * y / m_height));
   // A pixel weighs what the brightest of those around it does, since radiance is read between them:
@@ -47,6 +80,11 @@ EnvironmentMap::EnvironmentMap(const image::Image& image, const Rgb& scale)
                 static_cast<std::size_t>(x)] = static_cast<float>(sum);
       integral += Vec3d(pixel(x, y)) * bandOverPixels;
     }
+    if (!(sum <= static_cast<double>(std::numeric_limits<float>::max())))
+      throw ConfigError(fmt::format(
+          "the pixels of row {} (channels up to {:.3g} W m^-2 sr^-1) add up to more than a float "
+          "holds; lower the light's intensity",
+          y, m_brightest));
     m_total += sum * bandOverPixels;
     m_rows.push_back(m_total);
   }

@@ -20,6 +20,16 @@ std::span<const Param> lightParams() {
   return params;
 }
 
+Rgb scaledColor(const ParamValues& values) {
+  const Rgb scaled = values.rgb("color") * static_cast<float>(values.real("intensity"));
+  if (!std::isfinite(Vec3d(scaled).x + Vec3d(scaled).y + Vec3d(scaled).z))
+    throw ConfigError(
+        fmt::format("'intensity' = {:.3g} times 'color' is more than a float holds; lower the "
+                    "intensity",
+                    values.real("intensity")));
+  return scaled;
+}
+
 Vec3d directionFromValues(const ParamValues& values, std::string_view light) {
   const Vec3d d = values.vec3("target") - values.vec3("position");
   const double length = glm::length(d);

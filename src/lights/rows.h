@@ -63,10 +63,8 @@ constexpr Param bodyRadiusRow() {
           .max = 1e9};
 }
 
-/// intensity times color.
-inline Rgb scaledColor(const ParamValues& values) {
-  return values.rgb("color") * static_cast<float>(values.real("intensity"));
-}
+/// intensity times color. @throws ConfigError when that is more than a float holds
+Rgb scaledColor(const ParamValues& values);
 
 inline bool isGreyColor(const Rgb& c) {
   return c.r == c.g && c.g == c.b;

@@ -9,11 +9,11 @@
 #include "effect_plan.h"
 #include "estimator_options.h"
 #include "light_notes.h"
+#include "light_setup.h"
 #include "medium_setup.h"
 #include "photon_map_stage.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/frames.h"
-#include "photosphere/core/registry.h"
 #include "photosphere/core/resources.h"
 #include "photosphere/core/rng.h"
 #include "photosphere/scene/plan.h"
@@ -50,23 +50,6 @@ SceneFile sceneOfFrame(const SceneFile& written, std::int64_t frame, const Setup
     throw ConfigError(fmt::format("{}: 'shutter' closes at {}, before it opens at {}",
                                   scene.cameraWhere, shutter.y, shutter.x));
   return scene;
-}
-
-void buildLights(const SceneFile& scene, FrameSetup& setup) {
-  for (const LightEntry& entry : scene.lights) {
-    if (entry.type == "environment" && scene.effects.text("environment") == "off") continue;
-    const lights::LightPlugin& plugin =
-        findPlugin(lights::lightModels(), entry.type, "light type", entry.where);
-    try {
-      ParamValues values = entry.values;
-      if (values.given("file"))
-        values.set("file", scene.resolvePath(values.text("file")), entry.where);
-      setup.lights.push_back(plugin.create(values, setup.space));
-    } catch (const ConfigError& error) {
-      throw ConfigError(fmt::format("{}: {}", entry.where, error.what()));
-    }
-    setup.lights.back()->setName(entry.values.text("name"));
-  }
 }
 
 // Nearest-neighbour spacing of the carriers [m].

@@ -69,6 +69,37 @@ TEST_F(Invalid, AreZeroWhereAllowed) {
   EXPECT_EQ(run({"render", "out.vdb", "-o", "c.exr", "--res", "8x8"}, false).exitCode, 0);
 }
 
+TEST_F(Invalid, SoArePicturesOfTheSurroundings) {
+  volume::writeVdb(m_folder / "good.vdb", {ballOfSmoke(0.1)});
+  image::Image sky(8, 4);
+  sky.addLayer("", image::ChannelKind::color);
+  for (int i = 0; i < 32; ++i)
+    sky.setRgb("", i % 8, i / 8, Rgb(0.5f));
+  sky.setRgb("", 2, 1, Rgb(0.5f, 1234.5f, 0.5f));
+  sky.setRgb("", 4, 3, Rgb(-0.5f));
+  image::ExrOptions options;
+  options.compression = image::ExrCompression::none;
+  options.floatColor = true;
+  image::writeExr(m_folder / "sky.exr", sky, {}, options);
+  replaceFloats(m_folder / "sky.exr", 1234.5f, std::numeric_limits<float>::quiet_NaN());
+  const std::vector<std::string> command = {
+      "render", "good.vdb",
+      "-o",     "s.exr",
+      "--res",  "8x8",
+      "-s",     "estimator.photons=1000",
+      "-s",     "light=[{ type = \"environment\", file = \"sky.exr\" }]"};
+  constexpr const char* kPixels =
+      "1 NaN, 0 infinite and 1 negative pixels, the first (nan) at (2, 1)";
+  const RunResult refused = run(command, false);
+  EXPECT_EQ(refused.exitCode, 4) << refused.err;
+  for (const char* words : {"sky.exr: ", kPixels, "--allow-invalid"})
+    EXPECT_NE(refused.err.find(words), std::string::npos) << refused.err;
+  EXPECT_FALSE(fs::exists(m_folder / "s.exr"));
+  const RunResult taken = run(command, true);
+  EXPECT_EQ(taken.exitCode, 0) << taken.err;
+  EXPECT_NE(taken.err.find(kPixels), std::string::npos) << taken.err;
+}
+
 TEST_F(Invalid, NegativeValuesOfOtherGridsArePlain) {
   volume::writeVdb(
       m_folder / "shadow.vdb",

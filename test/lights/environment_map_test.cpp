@@ -1,5 +1,6 @@
 // Surroundings from a picture: what is drawn, what is read, and where up is.
 #include <cmath>
+#include <limits>
 
 #include "fixture.h"
 #include "photosphere/core/error.h"
@@ -137,6 +138,46 @@ TEST_F(Sky, IsHashedByItsPixels) {
   const auto a = light(sky(32, 16)), b = light(sky(32, 16)), c = light(sky(64, 32));
   EXPECT_EQ(hashOf(*a), hashOf(*b));
   EXPECT_NE(hashOf(*a), hashOf(*c));
+}
+
+TEST_F(Sky, NamesPixelsThatAreNoLight) {
+  image::Image picture = sky(8, 4);
+  EXPECT_EQ(light(picture)->invalidContent(), "");
+  const Rgb upper = light(picture)->background({0, 1, 0});
+  picture.channel("G")[picture.index(3, 2)] = -0.5f;
+  picture.channel("R")[picture.index(5, 2)] = 1234.5f;
+  picture.channel("B")[picture.index(5, 2)] = -1.0f;
+  picture.channel("B")[picture.index(6, 3)] = 5432.1f;
+  const std::filesystem::path file = folder / "bad.exr";
+  image::ExrOptions options;
+  options.compression = image::ExrCompression::none;
+  options.floatColor = true;
+  image::writeExr(file, picture, {}, options);
+  test::replaceFloats(file, 1234.5f, std::numeric_limits<float>::infinity());
+  test::replaceFloats(file, 5432.1f, std::numeric_limits<float>::quiet_NaN());
+  const auto map = makeLight("environment", {{"file", file.string()}});
+  EXPECT_EQ(map->invalidContent(),
+            "1 NaN, 1 infinite and 1 negative pixels, the first (-0.5) at (3, 2)");
+  EXPECT_EQ(map->background({0, 1, 0}), upper);
+  EXPECT_TRUE(std::isfinite(maxComponent(map->power({Vec3d(0), 1}))));
+}
+
+// Sums of a row past what a float holds would send photons into no direction.
+TEST_F(Sky, MoreLightThanAFloatHoldsIsRefused) {
+  image::Image picture(8, 4);
+  picture.addLayer("", image::ChannelKind::color);
+  picture.setRgb("", 3, 1, Rgb(1e36f));
+  const auto map = light(picture);
+  Rng rng(RandomKey::fromSeed(9, 0), RandomStream::test, 0);
+  for (int i = 0; i < 1000; ++i) {
+    const Emission photon = map->emit({Vec3d(0), 1}, uniform4(rng));
+    ASSERT_NEAR(glm::length(Vec3d(photon.direction)), 1, 1e-6);
+    ASSERT_TRUE(std::isfinite(photon.power.r));
+  }
+  EXPECT_THROW(light(picture, "300"), ConfigError);
+  EXPECT_THROW(makeLight("point", {{"intensity", "1e39"}}), ConfigError);
+  picture.setRgb("", 3, 1, Rgb(3e38f));
+  EXPECT_THROW(light(picture), ConfigError);
 }
 
 TEST_F(Sky, BlackAndMissingAndDamagedPicturesAreAnswered) {

@@ -240,6 +240,28 @@ TEST_F(HardValues, WhatIsSeenLiesInTheMiddleOfLocalSpace) {
   EXPECT_LT(glm::length(setup.medium->bounds().center()), 1e-6);
 }
 
+// Photons of more light than floats hold would be no numbers.
+TEST_F(HardValues, MoreLightThanPhotonsCarryIsRefused) {
+  const std::string file = write("a.vdb", {ballGrid("density", Vec3d(0), 0.1)});
+  EXPECT_EQ(complaint([&] { setUp(file, {"light.0.intensity=1e30"}); }), "");
+  for (const char* intensity : {"3e38", "1e39"}) {
+    const std::string said =
+        complaint([&] { setUp(file, {fmt::format("light.0.intensity={}", intensity)}); });
+    EXPECT_TRUE(contains(said, "t.toml") && contains(said, "light")) << said;
+    EXPECT_TRUE(contains(said, "lower")) << said;
+  }
+  // Together they are too many.
+  const std::string lamp = "{type=\"point\", position=[0, 3, 0], intensity=2e36}";
+  EXPECT_EQ(complaint([&] { setUp(file, {"light=[" + lamp + "]"}); }), "");
+  std::string many = lamp;
+  for (int i = 0; i < 20; ++i)
+    many += ", " + lamp;
+  EXPECT_TRUE(contains(complaint([&] { setUp(file, {"light=[" + many + "]"}); }), "with it, "));
+  EXPECT_TRUE(contains(
+      complaint([&] { setUp(file, {"volume.0.emission={ grid = \"density\", scale = 1e38 }"}); }),
+      "emission.scale"));
+}
+
 TEST_F(HardValues, ABareCacheIsScaledWhateverItsUnits) {
   const auto scaleOf = [&](const std::string& file) {
     return sceneForVolume(file, {}, false).volumes.front().values.vec3("density_scale").x;

@@ -70,6 +70,17 @@ void writeText(const fs::path& path, const std::string& content) {
   if (!out) throw std::runtime_error("cannot write " + path.string());
 }
 
+void replaceFloats(const fs::path& path, float from, float to) {
+  std::string bytes = readText(path);
+  const std::string_view old(reinterpret_cast<const char*>(&from), sizeof from);
+  int found = 0;
+  for (std::size_t at = 0; (at = bytes.find(old, at)) != std::string::npos;
+       at += sizeof to, ++found)
+    bytes.replace(at, sizeof to, reinterpret_cast<const char*>(&to), sizeof to);
+  EXPECT_GT(found, 0) << path << " holds no " << from;
+  writeText(path, bytes);
+}
+
 namespace {
 
 RunResult run(const std::vector<std::string>& command, const fs::path& workingFolder) {

@@ -87,6 +87,9 @@ RunResult runShell(const std::string& command, const std::filesystem::path& work
 
 std::string readText(const std::filesystem::path& path);
 void writeText(const std::filesystem::path& path, const std::string& content);
+/// Puts numbers into a file that no writer lets through, where it holds others as plain floats. The
+/// test fails where it holds none.
+void replaceFloats(const std::filesystem::path& path, float from, float to);
 
 /// Pearson chi-squared test of a direction sampler against its density, over `8 rows^2`-cell bins
 /// of equal area with pooled small cells.

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <set>
 
@@ -89,6 +90,27 @@ TEST(SupportLattice, WalkGivesEachVoxelItsLength) {
     for (const auto& entry : sampled)
       EXPECT_NEAR(walked[entry.first], entry.second, 1.5e-3);
   }
+}
+
+// Flights that are not finite, and lattices wider than floats tell voxels apart.
+TEST(SupportLattice, WalkEndsWhateverTheNumbersAre) {
+  const Vec3i bricks(1 << 22, 1, 1);
+  const SupportLattice lattice(Vec3d(0.0), 1.0, bricks, {Vec3i(0, 4, 4), Vec3i(9, 4, 4)});
+  const auto walked = [&](const Vec3f& from, const Vec3f& d, float length) {
+    double sum = 0;
+    lattice.walk(from, d, length,
+                 [&](std::size_t, float, float part) { sum += static_cast<double>(part); });
+    return sum;
+  };
+  constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+  const Vec3f from(0.5f, 4.5f, 4.5f), along(1, 0, 0);
+  EXPECT_EQ(walked(from, along, 20), 1.5);
+  EXPECT_EQ(walked(from, along, 3e7f), 1.5);
+  EXPECT_EQ(walked(from, Vec3f(kNone), kInfinity), 0.0);
+  EXPECT_EQ(walked(from, Vec3f(1, kNone, 0), 20), 0.0);
+  EXPECT_EQ(walked(Vec3f(kNone), along, 20), 0.0);
+  EXPECT_EQ(walked(from, along, kInfinity), 0.0);
+  EXPECT_EQ(walked(from, along, kNone), 0.0);
 }
 
 TEST(Medium, OverlappingVolumesAddUp) {

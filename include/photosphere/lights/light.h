@@ -108,6 +108,8 @@ class Light {
   virtual bool isGrey() const = 0;
   /// Adds what decides its light and is not among its options: the content of files.
   virtual void addContent(Hasher& hasher) const { (void)hasher; }
+  /// What its files hold that is no light and counts as 0; empty = nothing.
+  virtual std::string invalidContent() const { return {}; }
 
  private:
   std::string m_name;

@@ -46,8 +46,8 @@ struct SceneFile {
   std::vector<VolumeEntry> volumes;
   std::vector<LightEntry> lights;
   ParamValues estimator, effects, render, output;
-  /// NaN, infinite and negative values of caches count as zero, and particles that have them are
-  /// left out; else they end the frame (exit 4).
+  /// NaN, infinite and negative values of caches and of environments' pictures count as zero, and
+  /// particles that have them are left out; else they end the frame (exit 4).
   bool allowInvalid = false;
   /// What sceneForVolume chose, one sentence each; empty for a scene that was read.
   std::vector<std::string> choices;

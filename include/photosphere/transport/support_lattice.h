@@ -55,6 +55,8 @@ class SupportLattice {
 
   /// Calls visit(number, distance to entry, length) for every active voxel that a flight crosses,
   /// in order (exact clipping, Amanatides & Woo 1987). `from` in local space, `d` unit, length [m].
+  /// Ends whatever the numbers are: a flight that is not finite, or spans more than 2^28 voxels,
+  /// crosses none.
   template <class Visit>
   void walk(const Vec3f& from, const Vec3f& d, float length, const Visit& visit) const;
 
@@ -86,6 +88,9 @@ void SupportLattice::walk(const Vec3f& from, const Vec3f& d, float length,
   const Vec3f start = (from - m_originF) * m_inverseEdge;
   const float edge = static_cast<float>(m_edge);
   const float end = length * m_inverseEdge;
+  // False, too, where one of them is no number.
+  const Vec3f reach = glm::abs(start) + glm::abs(d) * end;
+  if (!(reach.x + reach.y + reach.z < 0x1p28f)) return;
   struct Axis {
     Axis(float s, float d) : cell(static_cast<int>(std::floor(s))), step(d > 0.0f ? 1 : -1) {
       if (d == 0.0f) return;
@@ -102,7 +107,10 @@ void SupportLattice::walk(const Vec3f& from, const Vec3f& d, float length,
   };
   Axis x(start.x, d.x), y(start.y, d.y), z(start.z, d.z);
   float t = 0.0f;
-  while (t < end) {
+  // Faces on the way, and as many for rounding: millions of voxels out, where a float no longer
+  // tells them apart, distance alone would not get to the end.
+  const auto faces = static_cast<int>((std::abs(d.x) + std::abs(d.y) + std::abs(d.z)) * end);
+  for (int left = 2 * faces + 8; t < end && left > 0; --left) {
     const float exit = glm::min(end, glm::min(x.next, glm::min(y.next, z.next)));
     const std::int32_t n = number({x.cell, y.cell, z.cell});
     if (n >= 0 && exit > t) visit(static_cast<std::size_t>(n), t * edge, (exit - t) * edge);
