@@ -6,6 +6,7 @@
 #include "particle_gather.h"
 #include "per_step.h"
 #include "phase_reader.h"
+#include "photosphere/core/interrupt.h"
 #include "photosphere/core/parallel.h"
 #include "visible_weight.h"
 #include "voxel_smoothing.h"
@@ -180,8 +181,10 @@ std::shared_ptr<const std::vector<float>> visibleWeights(const Medium& medium,
   const VisibleWeight weight(medium, lattice, layout, view);
   auto weights = std::make_shared<std::vector<float>>(lattice.size());
   parallelFor(weights->size(), 256, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i)
+    for (std::size_t i = begin; i < end; ++i) {
+      throwIfInterrupted();  // lines through all that is before it
       (*weights)[i] = weight.mean(i);
+    }
   });
   return weights;
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "photosphere/core/interrupt.h"
 #include "photosphere/core/parallel.h"
 #include "photosphere/core/sampling.h"
 
@@ -102,7 +103,8 @@ void LightDepth::findBricks(const volume::MajorantGrid& majorants) {
   const Vec3i& dims = majorants.dims();
   const Vec3d size(majorants.cellSize());
   for (int z = 0; z < dims.z; ++z)
-    for (int y = 0; y < dims.y; ++y)
+    for (int y = 0; y < dims.y; ++y) {
+      throwIfInterrupted();
       for (int x = 0; x < dims.x; ++x) {
         if (!(majorants.majorant({x, y, z}) > 0.0f)) continue;
         Box3d cell, nodes;
@@ -117,6 +119,7 @@ void LightDepth::findBricks(const volume::MajorantGrid& majorants) {
             for (int bz = lo.z; bz <= hi.z; ++bz)
               reached[index(bx, by, bz)] = true;
       }
+    }
   for (int y = 0; y < m_bricks.y; ++y)
     for (int x = 0; x < m_bricks.x; ++x)
       for (int z = 0; z < m_bricks.z; ++z)
@@ -200,8 +203,10 @@ void LightDepth::fillFrom(const Along& along, float step) {
   columns.push_back(m_active.size());
   std::vector<float> nodes(m_active.size() * kBrickSize);
   parallelFor(count, 4, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t c = begin; c < end; ++c)
+    for (std::size_t c = begin; c < end; ++c) {
+      throwIfInterrupted();
       marchColumn(along, step, columns[c], columns[c + 1], nodes.data() + columns[c] * kBrickSize);
+    }
   });
   // Bricks by number, for the field that asks by place.
   const Vec3i* firstBrick = m_active.data();

@@ -8,6 +8,7 @@
 #include "instances.h"
 #include "lamp_choice.h"
 #include "light_depth.h"
+#include "photosphere/core/interrupt.h"
 #include "photosphere/core/log.h"
 #include "photosphere/core/resources.h"
 
@@ -175,7 +176,8 @@ Shadows::Table Shadows::uprightTable(const lights::Light& light,
   auto fetch = [&](const Vec3i& brick, float* depth) {
     bool lit = false;
     for (int z = 0; z < Field::kNodes; ++z)
-      for (int y = 0; y < Field::kNodes; ++y)
+      for (int y = 0; y < Field::kNodes; ++y) {
+        throwIfInterrupted();
         for (int x = 0; x < Field::kNodes; ++x) {
           const Vec3i node = brick * 8 + Vec3i(x, y, z);
           if (!besideSmoke(lattice, node)) {
@@ -189,6 +191,7 @@ Shadows::Table Shadows::uprightTable(const lights::Light& light,
                                                           static_cast<double>(in.distance));
           *depth++ = toLight.length > 0.0f ? marchedDepth(toLight, layer) : 0.0f;
         }
+      }
     // No node of this brick sees the lamp, so nothing in it is ever looked up with a weight.
     if (!lit) std::fill_n(depth - Field::kBrickSize, Field::kBrickSize, 0.0f);
   };

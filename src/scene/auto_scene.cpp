@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "axis_depths.h"
 #include "medium_setup.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/frames.h"
 #include "photosphere/scene/frame_setup.h"
 #include "photosphere/scene/scene_file.h"
-#include "photosphere/transport/tracking.h"
 #include "photosphere/volume/optical_depth.h"
 #include "photosphere/volume/vdb_file.h"
 #include "scene_reader.h"
@@ -98,39 +98,6 @@ Vec3d chooseUp(const CacheGrids& cache, const Box3d& box, std::vector<std::strin
   }
   choices.push_back("Y is up, as nothing in the file says otherwise.");
   return {0, 1, 0};
-}
-
-// Optical depths at density_scale 1 of rays along the three axes that meet smoke, sorted.
-std::vector<double> axisDepths(const transport::Medium& medium) {
-  constexpr int kRays = 48;
-  std::vector<double> depths;
-  const Box3d& box = medium.bounds();
-  const auto step = static_cast<float>(medium.voxelEdge());
-  double largest = 0;
-  for (int axis = 0; axis < 3; ++axis)
-    for (int i = 0; i < kRays * kRays; ++i) {
-      Vec3d from = box.min;
-      const int a = (axis + 1) % 3, b = (axis + 2) % 3;
-      const int column = i % kRays, row = i / kRays;
-      from[a] += (column + 0.5) / kRays * box.extent()[a];
-      from[b] += (row + 0.5) / kRays * box.extent()[b];
-      Vec3f d(0.0f);
-      d[axis] = 1.0f;
-      const double depth = static_cast<double>(transport::marchOpticalDepth(
-          medium, Vec3f(from), d, static_cast<float>(box.extent()[axis]), step));
-      largest = std::max(largest, depth);
-      depths.push_back(depth);
-    }
-  std::sort(depths.begin(), depths.end());
-  // A voxel that is out of all measure is not what the smoke is like.
-  constexpr double kMeasure = 1e6;
-  const auto smoke = std::upper_bound(depths.begin(), depths.end(), 0.0);
-  if (smoke != depths.end()) {
-    const double usual = *(smoke + (depths.end() - smoke) * 19 / 20);
-    if (largest > kMeasure * usual) largest = usual;
-  }
-  std::erase_if(depths, [&](double d) { return !(d > volume::kTraceDepth * largest); });
-  return depths;
 }
 
 // Whether a voxel is so deep that its density may have been cut off.

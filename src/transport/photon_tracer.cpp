@@ -218,6 +218,7 @@ void traceChunk(const Medium& medium, const Births& births, const FlightTimes& t
   Batch batch(sink);
   Follower<When> follower(medium, window, batch, stats);
   for (std::uint64_t photon = begin; photon < end; ++photon) {
+    throwIfInterrupted();
     Rng rng(key, RandomStream::photon, photon);
     When when;
     times.of(photon, when);

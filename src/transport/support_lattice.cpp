@@ -5,6 +5,7 @@
 #include <bit>
 
 #include "photosphere/core/error.h"
+#include "photosphere/core/interrupt.h"
 
 namespace photosphere::transport {
 
@@ -138,6 +139,7 @@ void checkTable(const Vec3d& bricks) {
 
 void markBox(const Vec3d& low, const Vec3d& high, Marks& marks) {
   const Vec3i first(glm::floor(low)), last(glm::floor(high));
+  throwIfInterrupted();
   for (int z = first.z; z <= last.z; ++z)
     for (int y = first.y; y <= last.y; ++y)
       for (int x = first.x; x <= last.x; ++x)
@@ -194,8 +196,10 @@ SupportLattice::SupportLattice(const Medium& medium, double edge, int margin,
     markWays(medium, m_origin, edge, marks);
   else
     markSupport(medium, m_origin, edge, marks);
-  for (int i = 0; i < margin; ++i)
+  for (int i = 0; i < margin; ++i) {
+    throwIfInterrupted();
     marks = marks.dilated();
+  }
   marks.forEach([&](const Vec3i& v) {
     if (!keep || keep(m_origin + (Vec3d(v) + 0.5) * m_edge)) m_voxels.push_back(v);
   });

@@ -4,6 +4,7 @@
 
 #include "openvdb_grid.h"
 #include "photosphere/core/error.h"
+#include "photosphere/core/interrupt.h"
 #include "photosphere/core/resources.h"
 #include "photosphere/volume/bricks.h"
 #include "photosphere/volume/invalid_values.h"
@@ -43,9 +44,11 @@ void touch(std::set<Vec3i, CoordLess>& bricks, const openvdb::CoordBBox& box, co
   const Vec3i lo(box.min().x() - origin.x, box.min().y() - origin.y, box.min().z() - origin.z);
   const Vec3i hi(box.max().x() - origin.x, box.max().y() - origin.y, box.max().z() - origin.z);
   for (int z = (lo.z - 1) >> 3; z <= hi.z >> 3; ++z)
-    for (int y = (lo.y - 1) >> 3; y <= hi.y >> 3; ++y)
+    for (int y = (lo.y - 1) >> 3; y <= hi.y >> 3; ++y) {
+      throwIfInterrupted();
       for (int x = (lo.x - 1) >> 3; x <= hi.x >> 3; ++x)
         bricks.insert({x, y, z});
+    }
 }
 
 // The nodes of a grid as values of type T; read(value) makes one of an active voxel.

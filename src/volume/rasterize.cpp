@@ -11,6 +11,7 @@
 
 #include "openvdb_grid.h"
 #include "photosphere/core/error.h"
+#include "photosphere/core/interrupt.h"
 #include "photosphere/core/parallel.h"
 #include "photosphere/core/resources.h"
 #include "point_bins.h"
@@ -89,6 +90,7 @@ class Rasterizer {
     const double mostReach = 0x1p29;
     parallelFor(blobs.size(), 4096, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
+        throwIfInterrupted();  // each may span millions of voxels
         Splat& splat = m_splats[i];
         splat.center = (blobs[i].position - origin) / voxelSize;
         splat.radius = blobs[i].radius / voxelSize;
@@ -128,6 +130,7 @@ class Rasterizer {
     spend(visits * sizeof(Visit));
     m_visits.reserve(static_cast<std::size_t>(visits));
     for (std::size_t i = 0; i < m_splats.size(); ++i) {
+      throwIfInterrupted();
       const Vec3i lo = m_splats[i].first() >> m_shift, hi = m_splats[i].last() >> m_shift;
       for (int x = lo.x; x <= hi.x; ++x)
         for (int y = lo.y; y <= hi.y; ++y)
@@ -150,6 +153,7 @@ class Rasterizer {
     const Vec3i corner = m_visits[begin].tile * m_edge;
     std::fill(buffer.begin(), buffer.end(), 0.0);
     for (std::size_t i = begin; i < end; ++i) {
+      throwIfInterrupted();  // all particles may lie in one tile
       const Splat& splat = m_splats[m_visits[i].splat];
       if (splat.scale < 0) {
         const Vec3i at(glm::floor(splat.center + 0.5));

@@ -9,6 +9,7 @@
 
 #include "openvdb_grid.h"
 #include "photosphere/core/error.h"
+#include "photosphere/core/interrupt.h"
 #include "splats.h"
 
 namespace photosphere::volume {
@@ -67,6 +68,7 @@ template <class LumpAt>
 Box3d middleOf(std::size_t count, const LumpAt& lump, const Box3d& whole, double all) {
   Box3d middle = whole;
   for (bool closer = true; closer;) {
+    throwIfInterrupted();
     const Box3d before = middle;
     closer = false;
     for (int axis = 0; axis < 3; ++axis) {

@@ -20,7 +20,7 @@ class SupportLattice {
   /// @param edge     voxel edge [m]
   /// @param margin   dilation in voxels, >= 0, along each axis
   /// @param keep     whether a voxel about that point is wanted; empty = all are
-  /// @throws MemoryError when the brick table alone would pass 4 GiB
+  /// @throws MemoryError when the brick table alone would pass 4 GiB; InterruptedError
   SupportLattice(const Medium& medium, double edge, int margin,
                  const std::function<bool(const Vec3d&)>& keep = {});
   /// Rebuilds a lattice from its placement and the coordinates of its active voxels, in their

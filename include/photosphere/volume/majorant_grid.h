@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "photosphere/core/interrupt.h"
 #include "photosphere/core/types.h"
 #include "photosphere/volume/bricks.h"
 
@@ -142,6 +143,7 @@ class MajorantGrid {
 
   /// Raises every cell to the largest value of the cells within a distance [m] of it.
   /// @param cells  one value a cell
+  /// @throws InterruptedError
   template <class T>
   void widen(std::vector<T>& cells, double reach) const;
 
@@ -175,6 +177,7 @@ void MajorantGrid::widen(std::vector<T>& cells, double reach) const {
     for (int z = 0; z < others.z; ++z)
       for (int y = 0; y < others.y; ++y)
         for (int x = 0; x < others.x; ++x) {
+          throwIfInterrupted();
           Vec3i c(x, y, z);
           const auto at = [&](int i) -> T& {
             c[axis] = i;
