@@ -25,8 +25,8 @@ class SentPower {
   }
 
   /// @param power  of the largest channel [W]
-  /// @param what  the light or volume that shines, as messages name it
-  /// @param key   what lowers it
+  /// @param what   the light or volume that shines, as messages name it
+  /// @param key    what lowers it
   void add(double power, const std::string& what, std::string_view key) {
     if (m_dark) return;
     m_sum += power;

@@ -1,6 +1,10 @@
 // Densities, particles and settings at the edge of what numbers hold, as a frame is set up.
 
+#include <algorithm>
+
 #include "fixture.h"
+#include "photosphere/transport/tracking.h"
+#include "photosphere/volume/optical_depth.h"
 #include "photosphere/volume/rasterize.h"
 
 namespace photosphere::test {
@@ -272,6 +276,51 @@ TEST_F(HardValues, ABareCacheIsScaledWhateverItsUnits) {
                     static_cast<double>(value) / usual,
                 1, 1e-5)
         << value;
+}
+
+// What lies between is passed over: the depths that decide are those of whole rays.
+TEST_F(HardValues, ABareCacheIsScaledByItsSmokeAlone) {
+  const Vec3i size(20, 24, 96);
+  std::vector<float> values;
+  for (int z = 0; z < size.z; ++z)
+    for (int y = 0; y < size.y; ++y)
+      for (int x = 0; x < size.x; ++x) {
+        const Vec3d p = Vec3d(x, y, z < size.z / 2 ? z : size.z - 1 - z) - Vec3d(9.5, 11.5, 9.5);
+        values.push_back(glm::length(p) < 9 ? 0.2f + 0.01f * static_cast<float>(x + z) : 0.0f);
+      }
+  const std::string file =
+      write("a.vdb", {volume::denseToGrid("density", size, values, Mat4d(1.0))});
+  const FrameSetup setup = setUp(file, {"volume.0.density_scale=1"});
+  const transport::Medium& medium = *setup.medium;
+  const Box3d& box = medium.bounds();
+  std::vector<double> depths;
+  for (int axis = 0; axis < 3; ++axis)
+    for (int i = 0; i < 48 * 48; ++i) {
+      Vec3d from = box.min;
+      from[(axis + 1) % 3] += (i % 48 + 0.5) / 48 * box.extent()[(axis + 1) % 3];
+      from[(axis + 2) % 3] += (i / 48 + 0.5) / 48 * box.extent()[(axis + 2) % 3];
+      Vec3f d(0.0f);
+      d[axis] = 1.0f;
+      depths.push_back(static_cast<double>(transport::marchOpticalDepth(
+          medium, Vec3f(from), d, static_cast<float>(box.extent()[axis]),
+          static_cast<float>(medium.voxelEdge()))));
+    }
+  std::sort(depths.begin(), depths.end());
+  const double least = volume::kTraceDepth * depths.back();
+  std::erase_if(depths, [&](double depth) { return !(depth > least); });
+  ASSERT_GT(depths.size(), 100u);
+  EXPECT_EQ(sceneForVolume(file, {}, false).volumes.front().values.vec3("density_scale").x,
+            volume::roundedToTwoDigits(volume::kSmokeDepth / depths[depths.size() / 2]));
+}
+
+// A million empty cells between particles, which no ray can afford to walk through by itself.
+TEST_F(HardValues, ABareCacheMayBeNearlyEmpty) {
+  volume::ParticleSet set;
+  for (int i = 0; i < 500; ++i)
+    set.positions.emplace_back(1000.0 * i, 0, 0);
+  set.add({"pscale", 1, std::vector<float>(500, 0.01f)});
+  const std::string file = write("a.vdb", {volume::pointsToGrid(set, "points", 1)});
+  EXPECT_GT(sceneForVolume(file, {}, false).volumes.front().values.vec3("density_scale").x, 0);
 }
 
 }  // namespace
