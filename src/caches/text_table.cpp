@@ -71,6 +71,11 @@ std::vector<std::string> customNames(std::size_t count, bool pts) {
   return names;
 }
 
+bool holdPositions(const std::vector<ColumnGroup>& groups) {
+  return std::any_of(groups.begin(), groups.end(),
+                     [](const ColumnGroup& group) { return group.name == "P"; });
+}
+
 class TableReader {
  public:
   TableReader(FileReader& file, bool pts, std::vector<std::string>& notes)
@@ -78,13 +83,14 @@ class TableReader {
 
   volume::ParticleSet read(const std::vector<std::string>& names) {
     std::string first;
-    if (!firstLine(first)) fail("has no row of numbers; export it again");
+    if (!firstLine(first)) return withoutRows(names);
     m_delimiter = sniffDelimiter(first);
     std::vector<std::string> cells = splitCells(first, m_delimiter);
     std::uint64_t count = 0;
-    if (m_pts && cells.size() == 1 && parseInteger(cells[0], count)) {
+    // A scan of no points is followed by the count of the next one, or by nothing.
+    while (m_pts && cells.size() == 1 && parseInteger(cells[0], count)) {
       expect(count);
-      if (!firstLine(first) && count > 0) fail("has a count and no points");
+      if (!firstLine(first)) return finish();
       m_delimiter = sniffDelimiter(first);
       cells = splitCells(first, m_delimiter);
     }
@@ -133,6 +139,17 @@ class TableReader {
     return false;
   }
 
+  /// A frame without particles, which only a comment that names the columns tells from a file that
+  /// broke off. @throws InputError without one
+  volume::ParticleSet withoutRows(const std::vector<std::string>& given) {
+    const std::vector<std::string> named = splitCells(m_comment, sniffDelimiter(m_comment));
+    if (named.size() > kMaxColumns || !holdPositions(groupColumns(named)))
+      fail("has no row of numbers; export it again");
+    m_names = given.empty() ? named : given;
+    makeColumns({});
+    return finish();
+  }
+
   std::vector<std::string> chooseNames(const std::vector<std::string>& given,
                                        const std::vector<std::string>& cells, bool header) {
     std::vector<std::string> names = given;
@@ -175,6 +192,12 @@ class TableReader {
         origin.push_back(i);
       }
     std::vector<ColumnGroup> groups = groupColumns(kept);
+    if (!holdPositions(groups))
+      fail(fmt::format("has no columns x, y, z (it has: {}); name them by option 'columns'",
+                       fmt::join(m_names.begin(),
+                                 m_names.begin() + static_cast<std::ptrdiff_t>(
+                                                       std::min<std::size_t>(m_names.size(), 12)),
+                                 ", ")));
     m_columns.reserve(groups.size());
     for (ColumnGroup& group : groups) {
       bool text = false;
@@ -188,13 +211,6 @@ class TableReader {
     for (TableColumn& column : m_columns)
       for (int c = 0; c < column.arity(); ++c)
         m_target[column.group().columns[static_cast<std::size_t>(c)]] = {&column, c};
-    if (std::none_of(m_columns.begin(), m_columns.end(),
-                     [](const TableColumn& c) { return c.group().name == "P"; }))
-      fail(fmt::format("has no columns x, y, z (it has: {}); name them by option 'columns'",
-                       fmt::join(m_names.begin(),
-                                 m_names.begin() + static_cast<std::ptrdiff_t>(
-                                                       std::min<std::size_t>(m_names.size(), 12)),
-                                 ", ")));
   }
 
   /// Adds a count to the points that are to come. @throws InputError for more than there is room

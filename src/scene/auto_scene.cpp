@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 
 #include "axis_depths.h"
 #include "medium_setup.h"
@@ -193,52 +194,98 @@ std::string cameraText(const Box3d& box, const Vec3d& up, const Mat4d& placement
   return text + "\n";
 }
 
+// Frames of a sequence, from its middle outward; 1 of a file alone.
+std::vector<std::int64_t> framesFromTheMiddle(const std::string& pattern) {
+  if (!hasFrameToken(pattern)) return {1};
+  std::vector<std::int64_t> frames = findFrames(pattern);
+  if (frames.empty())
+    throw InputMissingError(pattern,
+                            "no frame of this sequence exists; check its path and its number of #");
+  const std::int64_t middle = frames[frames.size() / 2];
+  std::stable_sort(frames.begin(), frames.end(), [middle](std::int64_t a, std::int64_t b) {
+    return std::abs(a - middle) < std::abs(b - middle);
+  });
+  return frames;
+}
+
+// What everything is chosen from: a first set-up of one frame, which says where the smoke is and
+// how deep.
+struct Probe {
+  std::int64_t frame = 1;
+  CacheGrids cache;
+  std::string density;
+  double scale = 1;  // density_scale of the set-up
+  SceneFile scene;
+  FrameSetup smoke;
+  std::vector<std::string> choices;
+};
+
+Probe probeFrame(const std::string& pattern, const std::string& folder, std::int64_t frame,
+                 const std::vector<std::string>& sets, bool allowInvalid) {
+  Probe probe;
+  probe.frame = frame;
+  probe.cache = readCacheGrids(framePath(pattern, frame));
+  probe.density =
+      isSet(sets, "volume.0.density") ? "density" : chooseDensity(probe.cache, probe.choices);
+  // At scale 1, or at a lower one, where that would be past measure in a voxel.
+  const auto setUpAt = [&](double scale) {
+    probe.scale = scale;
+    probe.scene =
+        parseScene(volumeText(pattern, probe.density, scale), pattern, folder, volumeSets(sets));
+    probe.scene.allowInvalid = allowInvalid;
+    probe.smoke = setUpFrame(probe.scene, frame);
+  };
+  setUpAt(1);
+  while (!isSet(sets, "volume.0.density_scale") && isPastMeasure(*probe.smoke.medium) &&
+         probe.scale > kLeastProbe)
+    setUpAt(probe.scale * kThinner);
+  return probe;
+}
+
+// Of the frame nearest the middle that has smoke, else of the middle one.
+Probe probeSequence(const std::string& pattern, const std::string& folder,
+                    const std::vector<std::string>& sets, bool allowInvalid) {
+  const std::vector<std::int64_t> frames = framesFromTheMiddle(pattern);
+  Probe probe = probeFrame(pattern, folder, frames.front(), sets, allowInvalid);
+  for (std::size_t i = 1; i < frames.size() && probe.smoke.worldBounds.empty(); ++i)
+    if (Probe next = probeFrame(pattern, folder, frames[i], sets, allowInvalid);
+        !next.smoke.worldBounds.empty())
+      probe = std::move(next);
+  if (probe.smoke.worldBounds.empty())
+    probe.choices.emplace_back(
+        "There is no smoke; the camera frames a cube of edge 1 about the origin.");
+  else if (hasFrameToken(pattern))
+    probe.choices.insert(
+        probe.choices.begin(),
+        fmt::format("Camera and density_scale are chosen from frame {}, {}.", probe.frame,
+                    probe.frame == frames.front()
+                        ? "the middle of the sequence"
+                        : "the nearest to the middle of the sequence that has smoke"));
+  return probe;
+}
+
 }  // namespace
 
 SceneFile sceneForVolume(const std::filesystem::path& path, const std::vector<std::string>& sets,
                          bool allowInvalid) {
   const std::string pattern = std::filesystem::absolute(path).lexically_normal().string();
-  std::int64_t frame = 1;
-  std::vector<std::string> choices;
-  if (hasFrameToken(pattern)) {
-    const std::vector<std::int64_t> frames = findFrames(pattern);
-    if (frames.empty())
-      throw InputMissingError(
-          pattern, "no frame of this sequence exists; check its path and its number of #");
-    frame = frames[frames.size() / 2];
-    choices.push_back(fmt::format(
-        "Camera and density_scale are chosen from frame {}, the middle of the sequence.", frame));
-  }
   const std::string folder = std::filesystem::path(pattern).parent_path().string();
-  const CacheGrids cache = readCacheGrids(framePath(pattern, frame));
-  const std::string density =
-      isSet(sets, "volume.0.density") ? "density" : chooseDensity(cache, choices);
-
-  // A first set-up at scale 1 says where the smoke is and how deep: or at a lower one, where that
-  // would be past measure in a voxel.
-  double probed = 1;
-  const auto probeAt = [&](double scale) {
-    SceneFile probe =
-        parseScene(volumeText(pattern, density, scale), pattern, folder, volumeSets(sets));
-    probe.allowInvalid = allowInvalid;
-    return probe;
-  };
-  const SceneFile probe = probeAt(probed);
-  FrameSetup smoke = setUpFrame(probe, frame);
-  const bool scaleIsSet = isSet(sets, "volume.0.density_scale");
-  while (!scaleIsSet && isPastMeasure(*smoke.medium) && probed > kLeastProbe)
-    smoke = setUpFrame(probeAt(probed *= kThinner), frame);
-  if (smoke.worldBounds.empty())
-    throw InputError(framePath(pattern, frame), fmt::format("grid '{}' holds no smoke", density));
-  const double scale = scaleIsSet ? probe.volumes.front().values.vec3("density_scale").x
-                                  : chooseScale(*smoke.medium, probed, choices);
-  const Vec3d up = chooseUp(cache, smoke.worldBounds, choices);
-  const Mat4d camera = frameBox(smoke.worldBounds, smoke.worldBounds.center(), up, kFov,
-                                Vec2i(probe.camera.vec2("resolution")));
-  std::string text = cameraText(smoke.worldBounds, up, camera, sets, choices);
-  text += volumeText(pattern, density, scale);
+  Probe probe = probeSequence(pattern, folder, sets, allowInvalid);
+  std::vector<std::string> choices = std::move(probe.choices);
+  const bool smoke = !probe.smoke.worldBounds.empty();
+  const Box3d box = smoke ? probe.smoke.worldBounds : Box3d{Vec3d(-0.5), Vec3d(0.5)};
+  double scale = 1;
+  if (isSet(sets, "volume.0.density_scale"))
+    scale = probe.scene.volumes.front().values.vec3("density_scale").x;
+  else if (smoke)
+    scale = chooseScale(*probe.smoke.medium, probe.scale, choices);
+  const Vec3d up = chooseUp(probe.cache, box, choices);
+  const Mat4d camera =
+      frameBox(box, box.center(), up, kFov, Vec2i(probe.scene.camera.vec2("resolution")));
+  std::string text = cameraText(box, up, camera, sets, choices);
+  text += volumeText(pattern, probe.density, scale);
   if (!isSet(sets, "light"))
-    text += keyLight(smoke.worldBounds, up, camera, smoke.space.metersPerUnit, choices);
+    text += keyLight(box, up, camera, probe.smoke.space.metersPerUnit, choices);
   if (!isSet(sets, "volume.0.albedo"))
     choices.push_back(fmt::format("albedo = {}: bright smoke.", kAlbedo));
   if (!isAnySet(sets, {"volume.0.phase", "volume.0.phase.g"}))

@@ -182,8 +182,9 @@ CacheGrids readCacheGrids(const std::string& path) {
   caches::CacheContent content = caches::readCache(path);
   out.grids = std::move(content.grids);
   out.notes = std::move(content.notes);
+  // A frame of no particles is a frame as well: of nothing.
   for (const volume::ParticleSet& set : content.particles)
-    if (set.size() > 0) out.pointGrids.push_back(volume::pointsToGrid(set, "points", 0));
+    out.pointGrids.push_back(volume::pointsToGrid(set, "points", 0));
   return out;
 }
 

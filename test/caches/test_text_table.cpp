@@ -83,6 +83,32 @@ TEST(TextTable, EmptyCellsAreNotANumberAndAreNoted) {
   EXPECT_EQ(content.notes.size(), 1u);
 }
 
+// Simulations emit nothing in some frames: what their writers make of that is no damage.
+TEST(TextTable, FramesWithoutParticlesAreEmpty) {
+  for (const auto& [name, text] : std::initializer_list<std::pair<const char*, const char*>>{
+           {"a.csv", "x,y,z,pscale\n"},
+           {"a.csv", "# of a solver\nx,y,z,pscale"},
+           {"a.xyz", "# x y z vx vy vz\n"},
+           {"a.pts", "0\n"},
+           {"a.pts", "0\n0\n"}}) {
+    const CacheContent content = read(name, text);
+    ASSERT_EQ(content.particles.size(), 1u) << text;
+    EXPECT_EQ(content.particles[0].size(), 0u) << text;
+    for (const volume::Attribute& attribute : content.particles[0].attributes)
+      EXPECT_EQ(attribute.size(), 0u) << text;
+  }
+  EXPECT_NE(read("a.csv", "x,y,z,pscale\n").particles[0].find("pscale"), nullptr);
+  EXPECT_EQ(read("a.pts", "0\n2\n1 1 1\n2 2 2\n").particles[0].size(), 2u);
+  for (const auto& [name, text] :
+       std::initializer_list<std::pair<const char*, const char*>>{{"a.csv", ""},
+                                                                  {"a.csv", "\n\n"},
+                                                                  {"a.csv", "# of a solver\n"},
+                                                                  {"a.csv", "a,b\n"},
+                                                                  {"a.pts", "2\n"},
+                                                                  {"a.pts", "2\n0\n"}})
+    EXPECT_THROW(read(name, text), InputError) << text;
+}
+
 TEST(TextTable, ErrorsNameTheLine) {
   const auto message = [](const std::string& name, const std::string& text) -> std::string {
     try {

@@ -267,6 +267,29 @@ TEST_F(PipelineTest, EmptySmokeRendersTheBackgroundAlone) {
     EXPECT_EQ(pixel, Rgb(0.5f));
 }
 
+// Whatever the format says it in, and with nothing but the cache as well.
+TEST_F(PipelineTest, FramesOfNoParticlesAreEmpty) {
+  writeText(m_folder / "none.csv", "x,y,z,pscale,vx,vy,vz\n");
+  writeText(m_folder / "none.pts", "0\n");
+  writeText(m_folder / "none.ply",
+            "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty float y\n"
+            "property float z\nend_header\n");
+  volume::writeVdb(m_folder / "none.vdb", {volume::pointsToGrid({}, "points", 0)});
+  for (const char* name : {"none.csv", "none.pts", "none.ply", "none.vdb"}) {
+    const std::string path = (m_folder / name).string();
+    const std::vector<std::string> sets{"camera.resolution=[8, 8]", "estimator.photons=1000",
+                                        "estimator.carrier=particles", "volume.0.velocity=v"};
+    for (const SceneFile& s :
+         {scene(ballScene(path, Vec3d(0), 1), sets), sceneForVolume(path, sets)}) {
+      const FrameResult r = renderScene(s, 1);
+      EXPECT_EQ(meanOf(r.layers.beauty), 0.0) << name;
+      EXPECT_TRUE(std::any_of(r.notes.begin(), r.notes.end(), [](const std::string& note) {
+        return contains(note, "no smoke in it at this frame");
+      })) << name;
+    }
+  }
+}
+
 TEST_F(PipelineTest, PointsAloneAreRasterizedAndCarryLight) {
   const std::string path = (m_folder / "points.vdb").string();
   const volume::ParticleSet seeded =
@@ -530,6 +553,15 @@ TEST_F(PipelineTest, ABareVolumeTakesAnotherCameraOrLight) {
   EXPECT_FALSE(chosen("volume.0.albedo=0.5", "albedo = "));
   EXPECT_TRUE(chosen("volume.0.albedo=0.5", "g = 0.4"));
   EXPECT_FALSE(chosen("volume.0.phase.g=0.1", "g = "));
+}
+
+TEST_F(PipelineTest, ABareSequenceIsFramedWhereItHasSmoke) {
+  for (const int frame : {1, 2, 3})
+    writeText(m_folder / fmt::format("p.000{}.csv", frame), "x,y,z,pscale\n");
+  writeText(m_folder / "p.0004.csv", "x,y,z,pscale\n10,20,30,1\n11,20,30,1\n");
+  const SceneFile s = sceneForVolume(m_folder / "p.####.csv");
+  EXPECT_TRUE(contains(s.choices.front(), "frame 4, the nearest to the middle")) << s.choices[0];
+  EXPECT_LT(glm::length(s.camera.vec3("look_at") - Vec3d(10.5, 20, 30)), 4.0);
 }
 
 TEST_F(PipelineTest, ABareVolumeInCentimetresIsLitAlike) {

@@ -110,7 +110,8 @@ std::string dumpScene(const SceneFile& scene);
 /// The scene of `photosphere render FILE.vdb`: the named or only fog grid (or the points),
 /// extinction scaled to a useful optical depth, a camera that frames the smoke and one key light.
 /// `choices` says what was chosen and why.
-/// @param path  any cache that module `caches` reads; a path with `####` uses the first frame found
+/// @param path  any cache that module `caches` reads; a path with `####` uses the frame nearest the
+///              middle that has smoke. Where none has, a cube stands in its place for the camera
 /// @param sets          applied over what was chosen
 /// @param allowInvalid  as SceneFile::allowInvalid, which it sets
 /// @throws InputMissingError, InputError, ConfigError
