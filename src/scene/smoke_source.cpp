@@ -87,19 +87,20 @@ volume::ParticleSet pointsOf(const CacheGrids& cache) {
   return volume::gridToPoints(cache.pointGrids.front());
 }
 
-// Particles that rasterizing left out.
-void heedSkipped(const SceneFile& scene, const volume::RasterizeResult& result, std::size_t points,
-                 VolumeSource& source) {
-  if (result.skipped == 0) return;
-  const std::string what = fmt::format(
-      "{} of {} particles have a position, radius or mass that is negative or not finite, the "
-      "first is number {}",
-      result.skipped, points, result.firstSkipped);
+// Particles that cannot be what they should end the frame, or do without where the user allows it.
+// @param fault  what they have
+// @param then   what becomes of them
+void heedParticles(const SceneFile& scene, std::uint64_t count, std::size_t all,
+                   std::uint64_t first, std::string_view fault, std::string_view then,
+                   VolumeSource& source) {
+  if (count == 0) return;
+  const std::string what =
+      fmt::format("{} of {} particles have a {}, the first is number {}", count, all, fault, first);
   if (!scene.allowInvalid)
     throw InputError(
         source.path,
         fmt::format("{}; clean the cache, or give --allow-invalid to leave them out", what));
-  source.notes.push_back(fmt::format("{}: {}; they are left out", source.path, what));
+  source.notes.push_back(fmt::format("{}: {}; {}", source.path, what, then));
 }
 
 bool leavesOutStrays(const VolumeEntry& entry) {
@@ -128,6 +129,10 @@ Grid rasterized(const SceneFile& scene, const CacheGrids& cache, const VolumeEnt
   options.radius = entry.values.real("particle_radius");
   options.leaveOutStrays = leavesOutStrays(entry);
   const volume::ParticleSet points = pointsOf(cache);
+  if (!cache.unplaced.empty())
+    heedParticles(scene, cache.unplaced.size(), points.size() + cache.unplaced.size(),
+                  cache.unplaced.front(), "position that is not finite", "they are left out",
+                  source);
   if (points.size() == 0) return {};
   const volume::RasterizeResult result = [&] {
     try {
@@ -136,7 +141,9 @@ Grid rasterized(const SceneFile& scene, const CacheGrids& cache, const VolumeEnt
       throw InputError(cache.path, error.what());
     }
   }();
-  heedSkipped(scene, result, points.size(), source);
+  heedParticles(scene, result.skipped, points.size(), result.firstSkipped,
+                "position, radius or mass that is negative or not finite", "they are left out",
+                source);
   source.notes.push_back(
       fmt::format("{}: {} points rasterized at voxel edge {:.4g}, radius {:.4g} to {:.4g}{}",
                   cache.path, points.size(), result.voxelSize, result.radiusMin, result.radiusMax,
@@ -146,8 +153,13 @@ Grid rasterized(const SceneFile& scene, const CacheGrids& cache, const VolumeEnt
     noteStrays(*result.strays, "particles", source);
     options.within = result.strays->kept;
   }
-  if (const std::string& name = entry.values.text("velocity"); wantVelocity && !name.empty())
+  if (const std::string& name = entry.values.text("velocity"); wantVelocity && !name.empty()) {
+    const volume::InvalidVelocities invalid = volume::findInvalidVelocities(points, name);
+    heedParticles(scene, invalid.count, points.size(), invalid.first,
+                  fmt::format("velocity '{}' that is not finite", name),
+                  "the others move the smoke", source);
     source.velocity = volume::velocityOfParticles(points, name, options, cache.path);
+  }
   source.rasterizeSeconds = watch.seconds();
   return result.density;
 }
@@ -183,8 +195,11 @@ CacheGrids readCacheGrids(const std::string& path) {
   out.grids = std::move(content.grids);
   out.notes = std::move(content.notes);
   // A frame of no particles is a frame as well: of nothing.
-  for (const volume::ParticleSet& set : content.particles)
+  for (volume::ParticleSet& set : content.particles) {
+    const std::vector<std::size_t> unplaced = set.removeUnplaced();
+    out.unplaced.insert(out.unplaced.end(), unplaced.begin(), unplaced.end());
     out.pointGrids.push_back(volume::pointsToGrid(set, "points", 0));
+  }
   return out;
 }
 

@@ -18,6 +18,8 @@ struct CacheGrids {
   std::vector<volume::Grid> grids;       ///< without point grids
   std::vector<volume::Grid> pointGrids;  ///< of readers other than vdb: written as a grid first, so
                                          ///< that order and rounding are those of a file on disk
+  std::vector<std::size_t> unplaced;     ///< numbers of particles that those readers gave no finite
+                                         ///< position, and that no point grid has
   std::vector<std::string> notes;
 
   /// `density (float), v (vec3s)`, or "no grids".

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cmath>
 #include <type_traits>
 #include <utility>
 
@@ -49,6 +50,37 @@ Box3d ParticleSet::bounds() const {
     if (!glm::any(glm::isnan(p)))
       box.grow(p);  // a NaN would spoil the box, or not, depending on the order
   return box;
+}
+
+std::vector<std::size_t> ParticleSet::removeUnplaced() {
+  std::vector<std::size_t> unplaced;
+  for (std::size_t i = 0; i < positions.size(); ++i)
+    if (const Vec3d& p = positions[i];
+        !std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
+      unplaced.push_back(i);
+  // Elements of those particles, `arity` each; what is behind moves up.
+  const auto removeFrom = [&](auto& column, std::size_t arity) {
+    std::size_t to = 0;
+    auto next = unplaced.begin();
+    for (std::size_t i = 0; (i + 1) * arity <= column.size(); ++i) {
+      if (next != unplaced.end() && *next == i) {
+        ++next;
+        continue;
+      }
+      for (std::size_t c = 0; c < arity; ++c, ++to)
+        if (to != i * arity + c) column[to] = std::move(column[i * arity + c]);
+    }
+    column.resize(to);
+  };
+  if (unplaced.empty()) return unplaced;
+  removeFrom(positions, 1);
+  for (Attribute& attribute : attributes)
+    std::visit(
+        [&](auto& column) {
+          removeFrom(column, static_cast<std::size_t>(std::max(attribute.arity, 1)));
+        },
+        attribute.data);
+  return unplaced;
 }
 
 std::string houdiniName(std::string_view name) {

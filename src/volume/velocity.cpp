@@ -106,6 +106,18 @@ void extend(Vectors& grid, Front& front) {
   front = std::move(fresh);
 }
 
+// The attribute of that name where it can be a velocity, else nullptr.
+const Attribute* velocityColumn(const ParticleSet& particles, const std::string& attribute) {
+  const Attribute* v = particles.find(attribute);
+  return v && v->arity == 3 && v->size() >= particles.size() ? v : nullptr;
+}
+
+bool isInvalid(const Attribute& velocity, std::size_t particle) {
+  for (int c = 0; c < 3; ++c)
+    if (!std::isfinite(static_cast<float>(velocity.number(particle, c)))) return true;
+  return false;
+}
+
 }  // namespace
 
 Grid velocityForLookups(const Grid& grid, const Mat3d& linear, int margin,
@@ -127,35 +139,48 @@ Grid velocityForLookups(const Grid& grid, const Mat3d& linear, int margin,
   return Grid(vectors);
 }
 
+InvalidVelocities findInvalidVelocities(const ParticleSet& particles,
+                                        const std::string& attribute) {
+  InvalidVelocities found;
+  const Attribute* v = velocityColumn(particles, attribute);
+  for (std::size_t i = 0; v && i < particles.size(); ++i)
+    if (isInvalid(*v, i) && found.count++ == 0) found.first = i;
+  return found;
+}
+
 Grid velocityOfParticles(const ParticleSet& particles, const std::string& attribute,
                          const RasterizeOptions& options, const std::string& path) {
-  const Attribute* v = particles.find(attribute);
-  if (!v || v->arity != 3 || v->size() < particles.size())
+  const Attribute* v = velocityColumn(particles, attribute);
+  if (!v)
     throw InputError(path, fmt::format("its points have no attribute '{}' of three numbers; set "
                                        "volume.velocity to one that they have, or remove it",
                                        attribute));
   // Masses are not negative: a velocity that all share is added first and taken away again.
   double shift = 0;
+  std::vector<double> masses = particleMasses(particles, options);
   for (std::size_t i = 0; i < particles.size(); ++i) {
+    if (isInvalid(*v, i)) {
+      masses[i] = 0;
+      continue;
+    }
     if (!options.takes(particles.positions[i])) continue;
     for (int c = 0; c < 3; ++c)
-      if (const double value = std::abs(v->number(i, c)); std::isfinite(value))
-        shift = std::max(shift, value);
+      shift = std::max(shift, std::abs(v->number(i, c)));
   }
   RasterizeOptions same = options;
-  const RasterizeResult density = rasterize(particles, same);
+  ParticleSet weighted = particles;
+  weighted.add({"mass", 1, masses});
+  const RasterizeResult density = rasterize(weighted, same);
   same.voxelSize = density.voxelSize;
   if (density.density.activeVoxels() == 0) return {};
   const auto* mass = dynamic_cast<const openvdb::FloatGrid*>(density.density.base().get());
   auto out = Vectors::create(openvdb::Vec3f(0));
   out->setTransform(mass->transform().copy());
   out->setName(attribute);
-  const std::vector<double> masses = particleMasses(particles, options);
-  ParticleSet weighted = particles;
   for (int c = 0; c < 3; ++c) {
     std::vector<double> momenta(masses.size());
     for (std::size_t i = 0; i < masses.size(); ++i)
-      momenta[i] = masses[i] * (v->number(i, c) + shift);
+      momenta[i] = isInvalid(*v, i) ? 0.0 : masses[i] * (v->number(i, c) + shift);
     weighted.add({"mass", 1, std::move(momenta)});
     const Grid momentum = rasterize(weighted, same).density;
     const auto* p = dynamic_cast<const openvdb::FloatGrid*>(momentum.base().get());

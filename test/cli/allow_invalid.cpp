@@ -125,5 +125,39 @@ TEST_F(Invalid, ParticlesAreRefusedOrLeftOut) {
   EXPECT_NE(taken.err.find("they are left out"), std::string::npos) << taken.err;
 }
 
+// Those that lie nowhere, and those that fly nowhere; the first of either is number 3.
+TEST_F(Invalid, PositionsAndVelocitiesOfParticlesAreRefusedOrLeftOut) {
+  std::string places = "x,y,z,pscale\n", flights = "x,y,z,pscale,vx,vy,vz\n";
+  for (int i = 0; i < 6; ++i) {
+    places += fmt::format("{},0,{},1\n", i, i == 3 ? "nan" : i == 4 ? "-inf" : "0");
+    flights += fmt::format("{},0,0,1,{},0,0\n", i, i >= 3 ? "nan" : "1");
+  }
+  writeText(m_folder / "places.csv", places);
+  writeText(m_folder / "flights.csv", flights);
+  const std::vector<std::string> still{"render", "places.csv", "-o", "p.exr", "--res", "8x8"};
+  const std::vector<std::string> moving{"render", "flights.csv",
+                                        "-o",     "p.exr",
+                                        "--res",  "8x8",
+                                        "-s",     "volume.0.velocity=v",
+                                        "-s",     "estimator.photons=1000",
+                                        "-s",     "effects.motion_blur=on"};
+  for (const auto& [command, what] :
+       {std::pair{still,
+                  "places.csv: 2 of 6 particles have a position that is not finite, the "
+                  "first is number 3"},
+        std::pair{moving,
+                  "flights.csv: 3 of 6 particles have a velocity 'v' that is not finite, "
+                  "the first is number "}}) {
+    const RunResult refused = run(command, false);
+    EXPECT_EQ(refused.exitCode, 4) << refused.err;
+    EXPECT_NE(refused.err.find(what), std::string::npos) << refused.err;
+    EXPECT_FALSE(fs::exists(m_folder / "p.exr"));
+    const RunResult taken = run(command, true);
+    EXPECT_EQ(taken.exitCode, 0) << taken.err;
+    EXPECT_NE(taken.err.find(what), std::string::npos) << taken.err;
+    fs::remove(m_folder / "p.exr");
+  }
+}
+
 }  // namespace
 }  // namespace photosphere::test

@@ -125,5 +125,28 @@ TEST(Velocity, OfParticlesIsTheirMeanByMass) {
   EXPECT_THROW(velocityOfParticles(set, "mass", options, "a.ply"), InputError);
 }
 
+// Neither does one drag the others along, nor does it stand still where it is alone.
+TEST(Velocity, OfParticlesThatSayNoneIsThatOfTheOthers) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  ParticleSet set;
+  set.positions = {{0, 0, 0}, {0, 0, 0}, {20, 0, 0}};
+  set.add({"v", 3, std::vector<float>{3, -1, 0, 5, nan, 0, nan, nan, nan}});
+  RasterizeOptions options;
+  options.radius = 2.0;
+  options.voxelSize = 0.5;
+  const InvalidVelocities found = findInvalidVelocities(set, "v");
+  EXPECT_EQ(found.count, 2u);
+  EXPECT_EQ(found.first, 1u);
+  EXPECT_EQ(findInvalidVelocities(set, "w").count, 0u);
+  const Grid grid = velocityOfParticles(set, "v", options, "a.ply");
+  EXPECT_LT(grid.worldBounds().max.x, 3.0);
+  const GridStatistics lengths = statistics(grid);
+  EXPECT_NEAR(lengths.min, std::sqrt(10.0), 1e-4);
+  EXPECT_NEAR(lengths.max, std::sqrt(10.0), 1e-4);
+  set.add({"v", 3, std::vector<double>{1e39, 0, 0, 0, -1e39, 0, 0, 0, 1e300}});
+  EXPECT_EQ(findInvalidVelocities(set, "v").count, 3u);
+  EXPECT_FALSE(velocityOfParticles(set, "v", options, "a.ply"));
+}
+
 }  // namespace
 }  // namespace photosphere::test

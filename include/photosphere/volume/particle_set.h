@@ -45,6 +45,9 @@ class ParticleSet {
   /// Adds a column; replaces one of the same name.
   Attribute& add(Attribute attribute);
   Box3d bounds() const;
+  /// Takes out the particles whose position is not finite, as they lie nowhere.
+  /// @return their numbers, from 0
+  std::vector<std::size_t> removeUnplaced();
 };
 
 /// The Houdini name for what other software calls an attribute (`Position`, `velocity`, `radius`,

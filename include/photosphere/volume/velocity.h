@@ -1,6 +1,7 @@
 #pragma once
 // Velocities of smoke, from grids and from particles.
 
+#include <cstdint>
 #include <string>
 
 #include "photosphere/core/types.h"
@@ -21,8 +22,18 @@ namespace photosphere::volume {
 ///         first such voxel)
 Grid velocityForLookups(const Grid& grid, const Mat3d& linear, int margin, const std::string& path);
 
+/// Particles whose velocity is no number or beyond what a float holds.
+struct InvalidVelocities {
+  std::uint64_t count = 0;
+  std::uint64_t first = 0;  ///< number of the first of them, from 0
+};
+
+/// Counts them. None where the particles have no such attribute of three numbers.
+InvalidVelocities findInvalidVelocities(const ParticleSet& particles, const std::string& attribute);
+
 /// Mean velocity of particles, weighted by mass and kernel, on the voxels of the density that
-/// `rasterize` makes of them with the same options.
+/// `rasterize` makes of them with the same options. Those of an invalid velocity count for nothing:
+/// voxels that they alone reach are left out.
 /// @param attribute  of three numbers a particle [scene units/s]
 /// @return a vec3s grid of that name; empty handle when no particle lies anywhere
 /// @throws ConfigError, MemoryError as rasterize; InputError for an attribute that is missing or
