@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <sstream>
 
+#include "number_check.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/frames.h"
 #include "photosphere/core/log.h"
@@ -47,7 +48,7 @@ void addResumeOptions(CLI::App& app, ResumeOptions& options) {
       ->group(group);
   app.add_option("--checkpoint-interval", options.interval,
                  "Seconds between checkpoints of a frame under way [60]")
-      ->check(CLI::Range(0.1, 1e9).description(""))
+      ->check(finiteNumber({.least = 0.1, .most = 1e9}))
       ->type_name("S")
       ->group(group);
 }

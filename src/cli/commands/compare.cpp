@@ -10,6 +10,7 @@
 
 #include "command.h"
 #include "job_files.h"
+#include "number_check.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/log.h"
 #include "photosphere/image/exr.h"
@@ -176,7 +177,7 @@ std::function<int()> declareCompare(CLI::App& app) {
       ->type_name("C.exr");
   app.add_option("--tolerance", options->tolerance,
                  "Largest relative error, sqrt(relMSE), of any layer; past it exit 7 [none]")
-      ->check(CLI::NonNegativeNumber.description(""))
+      ->check(finiteNumber({.least = 0}))
       ->type_name("E");
   app.add_option("--layer", options->layers, "Only this layer, such as RGB or single; repeatable")
       ->type_name("NAME")

@@ -10,6 +10,7 @@
 #include "convert_frame.h"
 #include "frame_loop.h"
 #include "job_files.h"
+#include "number_check.h"
 #include "options.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/frames.h"
@@ -124,23 +125,27 @@ std::function<int()> declareConvert(CLI::App& app) {
                "Grid values belong to cell centres (Blender): add half a voxel");
   app.add_option("--velocity-scale", convert.placement.velocityScale,
                  "Factor on velocity grids, to scene units per second [1]")
+      ->check(finiteNumber())
       ->type_name("F");
   app.add_option("--density", convert.density, "Grid that is the medium [density]")
       ->type_name("NAME");
   app.add_option("--radius", convert.radius,
                  "Particle radius in scene units; 0 = pscale, else twice the median spacing [0]")
-      ->check(CLI::NonNegativeNumber.description(""))
+      ->check(finiteNumber({.least = 0}))
       ->type_name("R");
   app.add_flag("--keep-strays", convert.keepStrays,
                "Rasterize the few particles that lie far from all others, too");
   app.add_option("--voxel-size", convert.voxelSize,
                  "Voxel of the rasterized density in scene units; 0 = half the median radius [0]")
-      ->check(CLI::NonNegativeNumber.description(""))
+      ->check(finiteNumber({.least = 0}))
       ->type_name("H");
   app.add_option("--particles", convert.particles,
                  "Particles seeded where the input has grids only; 0 = none [60000]")
+      ->check(countingNumber())
       ->type_name("N");
-  app.add_option("--seed", convert.seed, "Seed of the seeded particles [1]")->type_name("N");
+  app.add_option("--seed", convert.seed, "Seed of the seeded particles [1]")
+      ->check(countingNumber())
+      ->type_name("N");
   app.add_flag(
       "--allow-invalid", convert.allowInvalid,
       "Write NaN, infinite and, in the density, negative values of grids as zero [exit 4]");

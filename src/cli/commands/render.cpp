@@ -8,6 +8,7 @@
 
 #include "command.h"
 #include "frame_loop.h"
+#include "number_check.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/interrupt.h"
 #include "photosphere/core/log.h"
@@ -158,8 +159,10 @@ std::function<int()> declareRender(CLI::App& app) {
   addSceneOptions(app, options->scene);
   app.add_option("--target-error", options->targetError,
                  "Go on until the estimated relative error is below; replaces render.target_error")
+      ->check(finiteNumber({.least = 0}))
       ->type_name("E");
   app.add_option("--time-limit", options->timeLimit, "Seconds a frame; replaces render.time_limit")
+      ->check(finiteNumber({.least = 0}))
       ->type_name("S");
   const char* group = "Image";
   app.add_option("--crop", options->crop, "Part of the frame in pixels, X1 and Y1 exclusive")
@@ -175,6 +178,7 @@ std::function<int()> declareRender(CLI::App& app) {
       ->type_name("OUT.png")
       ->group(group);
   app.add_option("--exposure", options->write.exposure, "Of the preview, in stops [0]")
+      ->check(finiteNumber({.least = -100, .most = 100}))
       ->type_name("STOPS")
       ->group(group);
   app.add_option("--ocio", options->write.ocioConfig,

@@ -9,6 +9,7 @@
 #include "command.h"
 #include "frame_loop.h"
 #include "job_files.h"
+#include "number_check.h"
 #include "options.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/frames.h"
@@ -147,7 +148,7 @@ void declareSettings(CLI::App& app, Options& options) {
       ->type_name("RANGE");
   app.add_option("--minutes", s.minutes,
                  "Time to spend, about; what does not fit is left out [10, quick 0.1]")
-      ->check(CLI::PositiveNumber.description(""))
+      ->check(finiteNumber({.positive = true}))
       ->type_name("N");
   app.add_option("--seeds", s.seeds, "Independent frames of each contender, at least 3 [5]")
       ->check(CLI::Range(3, 1000).description(""))

@@ -1,0 +1,44 @@
+#include "number_check.h"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <cmath>
+#include <cstdint>
+
+namespace photosphere::cli {
+
+namespace {
+
+std::string describe(const NumberBounds& bounds) {
+  if (bounds.positive) return " above 0";
+  if (std::isfinite(bounds.least) && std::isfinite(bounds.most))
+    return fmt::format(" from {} to {}", bounds.least, bounds.most);
+  return std::isfinite(bounds.least) ? fmt::format(" of at least {}", bounds.least) : "";
+}
+
+}  // namespace
+
+CLI::Validator finiteNumber(const NumberBounds& bounds) {
+  return {[bounds](std::string& text) -> std::string {
+            double value = 0;
+            if (CLI::detail::lexical_cast(text, value) && std::isfinite(value) &&
+                value >= bounds.least && value <= bounds.most && (!bounds.positive || value > 0))
+              return {};
+            return fmt::format("must be a finite number{}, not '{}'", describe(bounds), text);
+          },
+          ""};
+}
+
+CLI::Validator countingNumber() {
+  return {[](std::string& text) -> std::string {
+            std::uint64_t value = 0;
+            const char* const end = text.data() + text.size();
+            const auto [next, error] = std::from_chars(text.data(), end, value);
+            if (error == std::errc() && next == end) return {};
+            return fmt::format("must be a whole number of at least 0, not '{}'", text);
+          },
+          ""};
+}
+
+}  // namespace photosphere::cli
