@@ -58,6 +58,15 @@ void heedInvalid(caches::CacheContent& file, const std::string& path,
   }
 }
 
+/// Floats do not hold what some values become here; that is nothing to write.
+/// @param remedy  what the user can do
+void checkRange(const Grid& grid, const std::string& path, std::string_view remedy) {
+  const volume::InvalidValues found = volume::findInvalid(grid, false);
+  if (found.total() > 0)
+    throw InputError(path, fmt::format("grid '{}' would hold {}, which floats cannot; {}",
+                                       grid.name(), found.text(), remedy));
+}
+
 caches::CacheContent readInputs(const std::vector<std::string>& inputs,
                                 const ConvertOptions& options) {
   caches::CacheContent content;
@@ -70,6 +79,10 @@ caches::CacheContent readInputs(const std::vector<std::string>& inputs,
       log::info("{}: {}", path, note);
     heedInvalid(file, path, options);
     place(file, options.placement, format);
+    if (options.placement.velocityScale != 1)
+      for (const Grid& grid : file.grids)
+        if (grid.kind() == volume::GridKind::vector)
+          checkRange(grid, path, "give a smaller --velocity-scale");
     mergeContent(content, std::move(file), path);
     throwIfInterrupted();
   }
@@ -103,11 +116,15 @@ std::string radiusRule(const volume::RasterizeResult& result, const ConvertOptio
   return fmt::format("the particles' pscale, {:.6g} to {:.6g}", result.radiusMin, result.radiusMax);
 }
 
-void addDensity(caches::CacheContent& content, const ConvertOptions& options) {
+/// @param path  of the particles, for messages
+void addDensity(caches::CacheContent& content, const std::string& path,
+                const ConvertOptions& options) {
   ParticleSet& set = content.particles.front();
   volume::RasterizeResult result = volume::rasterize(set, {.voxelSize = options.voxelSize,
                                                            .radius = options.radius,
                                                            .leaveOutStrays = !options.keepStrays});
+  checkRange(result.density, path,
+             "scale the particles' mass, or give a larger --radius and --voxel-size");
   const double difference =
       result.massParticles > 0 ? std::abs(result.massGrid / result.massParticles - 1) : 0;
   printLine("  radius     median {:.6g}: {}", result.radiusMedian, radiusRule(result, options));
@@ -179,13 +196,15 @@ void printContent(const caches::CacheContent& content) {
 }
 
 /// Particles and density, whichever the inputs lack.
-void complete(caches::CacheContent& content, const ConvertOptions& options, bool gridsCanBeKept) {
+/// @param path  of an input, for messages
+void complete(caches::CacheContent& content, const std::string& path, const ConvertOptions& options,
+              bool gridsCanBeKept) {
   joinParticles(content);
   if (content.particles.empty())
     addParticles(content, options);
   else if (gridsCanBeKept && content.particles.front().size() > 0 &&
            !findGrid(content, options.density))
-    addDensity(content, options);
+    addDensity(content, path, options);
 }
 
 }  // namespace
@@ -222,7 +241,7 @@ void convertFrame(const std::vector<std::string>& inputs, const std::string& out
   const double readSeconds = watch.seconds();
   // Of the formats that can be written, .vdb alone holds grids.
   const bool keepsGrids = writer.name == "vdb";
-  complete(content, options, keepsGrids);
+  complete(content, inputs.front(), options, keepsGrids);
   throwIfInterrupted();
   if (!keepsGrids && !content.grids.empty() && !content.particles.empty()) {
     log::info("{}: {} holds no grids; write .vdb to keep them", output, writer.name);

@@ -26,6 +26,9 @@ class ExitCodes : public ::testing::TestWithParam<Case> {
     truncate(f / "cut.vdb");
     writePly(f / "points.ply", ribbon(50, true));
     writeText(f / "empty.ply", "");
+    writeText(f / "heavy.csv", "x,y,z,pscale,mass\n0,0,0,0.1,1e38\n0.1,0,0,0.1,1e38\n");
+    volume::writeVdb(f / "fast.vdb",
+                     {volume::denseVectorToGrid("v", Vec3i(1), {1e6f, 0, 0}, Mat4d(1.0))});
     writeText(f / "scene.abc", "Ogawa and so on");
     for (int i = 1; i <= 2; ++i)
       volume::writeVdb(f / ("seq.000" + std::to_string(i) + ".vdb"), {ballOfSmoke(0.1 * i)});
@@ -141,6 +144,14 @@ const Case kFiles[] = {
      "seq.0007.vdb"},
     {"ConvertDamaged", {"convert", "cut.vdb", "-o", "x.vdb"}, 4, "cut.vdb"},
     {"ConvertEmpty", {"convert", "empty.ply", "-o", "x.vdb"}, 4, "empty.ply"},
+    {"ConvertHeavy",
+     {"convert", "heavy.csv", "-o", "x.vdb"},
+     4,
+     "heavy.csv: grid 'density' would hold 0 NaN"},
+    {"ConvertFast",
+     {"convert", "fast.vdb", "-o", "x.vdb", "--velocity-scale", "1e35"},
+     4,
+     "fast.vdb: grid 'v' would hold 0 NaN, 1 infinite"},
     {"ConvertForeign", {"convert", "scene.abc", "-o", "x.vdb"}, 4, "export"},
     {"InspectMissing", {"inspect", "none.vdb"}, 3, "none.vdb"},
     {"CompareMissing", {"compare", "a.exr", "none.exr"}, 3, "none.exr"},
