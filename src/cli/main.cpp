@@ -36,6 +36,17 @@ void checkCommandName(int argc, char** argv) {
                                   suggestion(argv[1], names), fmt::join(names, ", ")));
 }
 
+/// What the shell makes of a variable that is not set is the name of no file, whatever the command.
+void refuseEmptyNames(CLI::App& command) {
+  for (CLI::Option* option : command.get_options()) {
+    const bool input = option->get_positional();
+    if (!input && !option->check_lname("output")) continue;
+    const std::string reason = fmt::format(
+        "an {}'s name is empty; is a variable of the shell not set?", input ? "input" : "output");
+    option->check([reason](const std::string& name) { return name.empty() ? reason : ""; }, "");
+  }
+}
+
 int parseAndRun(int argc, char** argv) {
   checkCommandName(argc, argv);
   CLI::App app("Renders light that is scattered many times in smoke.", "photosphere");
@@ -48,6 +59,7 @@ int parseAndRun(int argc, char** argv) {
     CLI::App* sub = app.add_subcommand(std::string(command->name), std::string(command->help));
     auto body = command->declare(*sub);
     addGeneralOptions(*sub, general);
+    refuseEmptyNames(*sub);
     sub->callback([&chosen, body = std::move(body)] { chosen = body; });
   }
   try {
