@@ -97,6 +97,7 @@ class Line {
 std::vector<ChanKey> parseChan(std::string_view text, const std::string& name) {
   std::vector<ChanKey> keys;
   int number = 0;
+  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);  // byte order mark of UTF-8
   while (!text.empty()) {
     const std::size_t end = text.find('\n');
     std::string_view line = text.substr(0, end);

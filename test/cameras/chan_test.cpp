@@ -51,6 +51,12 @@ TEST(Chan, GivesTheRaysOfTheMatrix) {
     EXPECT_LT(glm::length(a.origin - b.origin), 1e-14);
   }
   EXPECT_EQ(parseChan("1 0 0 0 0 0 0", "test").at(0).verticalFov, 0);
+  EXPECT_EQ(parseChan("\xEF\xBB\xBF"
+                      "7 0 0 0 0 0 0",
+                      "test")
+                .at(0)
+                .frame,
+            7);
 }
 
 TEST(Chan, ComplaintsNameTheLine) {
