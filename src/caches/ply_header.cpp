@@ -30,7 +30,10 @@ class HeaderParser {
 
   PlyHeader parse() {
     std::string_view line;
-    if (!m_file.nextLine(line) || trimmed(line) != "ply") fail("does not begin with 'ply'");
+    const bool any = m_file.nextLine(line);
+    if (any && trimmed(line).find('\r') != std::string_view::npos)
+      fail("its lines end in CR alone, as on old Macs");
+    if (!any || trimmed(line) != "ply") fail("does not begin with 'ply'");
     bool formatSeen = false;
     for (;;) {
       if (!m_file.nextLine(line)) fail("the file ends inside the header (no end_header)");

@@ -14,10 +14,10 @@ namespace {
 
 [[noreturn]] void badValue(const FileReader& file, std::string_view word,
                            const PlyProperty& property) {
-  throw InputError(file.path(),
-                   fmt::format("line {}: '{}' is not a {} for property '{}'; export the file again",
-                               file.lineNumber(), word.substr(0, 40), plyTypeName(property.type),
-                               property.name));
+  throw InputError(
+      file.path(),
+      fmt::format("line {}: '{}' is not a {} for property '{}'; export the file again",
+                  file.lineNumber(), shown(word), plyTypeName(property.type), property.name));
 }
 
 template <class T>

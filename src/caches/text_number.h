@@ -65,6 +65,20 @@ inline bool parseReal(std::string_view word, double& value) {
   return true;
 }
 
+/// The beginning of a word for a message: what no terminal shows is written out, as `\x00`.
+inline std::string shown(std::string_view word) {
+  std::string text;
+  for (const char c : word.substr(0, 40)) {
+    constexpr const char* kDigits = "0123456789abcdef";
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte >= 0x20 && byte != 0x7f)
+      text += c;
+    else
+      text.append("\\x").append(1, kDigits[byte >> 4]).append(1, kDigits[byte & 15]);
+  }
+  return text;
+}
+
 /// Appends the shortest text that reads back to the same value.
 template <class T>
 void appendNumber(std::string& text, T value) {

@@ -132,6 +132,8 @@ class TableReader {
         m_comment = text.substr(text.find_first_not_of("#/ \t") == text.npos
                                     ? text.size()
                                     : text.find_first_not_of("#/ \t"));
+      if (text.find('\r') != text.npos)
+        fail("its lines end in CR alone, as on old Macs; save it with LF or CRLF line ends");
       if (text.empty() || isComment(text)) continue;
       copy = text;
       return true;
@@ -245,7 +247,7 @@ class TableReader {
       const Target& target = m_target[column];
       if (target.column && !target.column->store(m_rows, target.component, cell))
         failLine(fmt::format(
-            "'{}' in column '{}' is not a number{}", cell.substr(0, 40), m_names[column],
+            "'{}' in column '{}' is not a number{}", shown(cell), m_names[column],
             cell.find(',') != cell.npos ? " (decimal commas: export with points)" : ""));
     }
     if (column < m_target.size())

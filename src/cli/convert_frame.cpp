@@ -78,7 +78,11 @@ caches::CacheContent readInputs(const std::vector<std::string>& inputs,
     for (const std::string& note : file.notes)
       log::info("{}: {}", path, note);
     heedInvalid(file, path, options);
-    place(file, options.placement, format);
+    try {
+      place(file, options.placement, format);
+    } catch (const ConfigError& error) {
+      throw ConfigError(fmt::format("{}: moved by --origin: {}", path, error.what()));
+    }
     if (options.placement.velocityScale != 1)
       for (const Grid& grid : file.grids)
         if (grid.kind() == volume::GridKind::vector)
@@ -116,13 +120,26 @@ std::string radiusRule(const volume::RasterizeResult& result, const ConvertOptio
   return fmt::format("the particles' pscale, {:.6g} to {:.6g}", result.radiusMin, result.radiusMax);
 }
 
+/// What cannot be rasterized is the file's doing where the sizes are chosen from it.
+volume::RasterizeResult rasterized(const ParticleSet& set, const std::string& path,
+                                   const ConvertOptions& options) {
+  try {
+    return volume::rasterize(set, {.voxelSize = options.voxelSize,
+                                   .radius = options.radius,
+                                   .leaveOutStrays = !options.keepStrays});
+  } catch (const ConfigError& error) {
+    if (options.voxelSize == 0 && options.radius == 0) throw InputError(path, error.what());
+    throw ConfigError(fmt::format("{}: {}", path, error.what()));
+  } catch (const MemoryError& error) {
+    throw MemoryError(fmt::format("{}: {}", path, error.what()));
+  }
+}
+
 /// @param path  of the particles, for messages
 void addDensity(caches::CacheContent& content, const std::string& path,
                 const ConvertOptions& options) {
   ParticleSet& set = content.particles.front();
-  volume::RasterizeResult result = volume::rasterize(set, {.voxelSize = options.voxelSize,
-                                                           .radius = options.radius,
-                                                           .leaveOutStrays = !options.keepStrays});
+  volume::RasterizeResult result = rasterized(set, path, options);
   checkRange(result.density, path,
              "scale the particles' mass, or give a larger --radius and --voxel-size");
   const double difference =

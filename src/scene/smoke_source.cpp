@@ -139,6 +139,8 @@ Grid rasterized(const SceneFile& scene, const CacheGrids& cache, const VolumeEnt
       return volume::rasterize(points, options);
     } catch (const ConfigError& error) {
       throw InputError(cache.path, error.what());
+    } catch (const MemoryError& error) {
+      throw MemoryError(fmt::format("{}: {}", cache.path, error.what()));
     }
   }();
   heedParticles(scene, result.skipped, points.size(), result.firstSkipped,
@@ -198,7 +200,11 @@ CacheGrids readCacheGrids(const std::string& path) {
   for (volume::ParticleSet& set : content.particles) {
     const std::vector<std::size_t> unplaced = set.removeUnplaced();
     out.unplaced.insert(out.unplaced.end(), unplaced.begin(), unplaced.end());
-    out.pointGrids.push_back(volume::pointsToGrid(set, "points", 0));
+    try {
+      out.pointGrids.push_back(volume::pointsToGrid(set, "points", 0));
+    } catch (const ConfigError& error) {
+      throw InputError(path, error.what());
+    }
   }
   return out;
 }

@@ -129,6 +129,10 @@ TEST(TextTable, ErrorsNameTheLine) {
   EXPECT_NE(message("a.pts", "18446744073709551615\n1 2 3\n").find("line 1"), std::string::npos);
   EXPECT_NE(message("a.pts", "1\n1 2 3\n18446744073709551615\n").find("line 3"), std::string::npos);
   EXPECT_NE(message("a.csv", std::string("x,y,z\0", 6)).find("not text"), std::string::npos);
+  EXPECT_NE(
+      message("a.csv", std::string("x,y,z\n1,2,3\n1,2,\0003\n", 19)).find("'\\x003' in column 'z'"),
+      std::string::npos);
+  EXPECT_NE(message("a.csv", "x,y,z\r1,2,3\r4,5,6\r").find("end in CR alone"), std::string::npos);
   EXPECT_NE(message("a.csv", std::string(3 << 20, 'x')).find("longer"), std::string::npos);
 }
 

@@ -26,6 +26,8 @@ class ExitCodes : public ::testing::TestWithParam<Case> {
     truncate(f / "cut.vdb");
     writePly(f / "points.ply", ribbon(50, true));
     writeText(f / "empty.ply", "");
+    writeText(f / "specks.csv", "x,y,z,pscale\n0,0,0,1e-30\n0.1,0,0,1e-30\n");
+    writeText(f / "giant.csv", "x,y,z,pscale\n0,0,0,0.1\n0.1,0,0,0.1\n0,0,0,1e30\n");
     writeText(f / "heavy.csv", "x,y,z,pscale,mass\n0,0,0,0.1,1e38\n0.1,0,0,0.1,1e38\n");
     volume::writeVdb(f / "fast.vdb",
                      {volume::denseVectorToGrid("v", Vec3i(1), {1e6f, 0, 0}, Mat4d(1.0))});
@@ -152,6 +154,13 @@ const Case kFiles[] = {
      "seq.0007.vdb"},
     {"ConvertDamaged", {"convert", "cut.vdb", "-o", "x.vdb"}, 4, "cut.vdb"},
     {"ConvertEmpty", {"convert", "empty.ply", "-o", "x.vdb"}, 4, "empty.ply"},
+    {"ConvertSpecks", {"convert", "specks.csv", "-o", "x.vdb"}, 4, "specks.csv: "},
+    {"ConvertGiant", {"convert", "giant.csv", "-o", "x.vdb"}, 5, "giant.csv: the largest"},
+    {"RenderGiant", {"render", "giant.csv", "-o", "x.exr"}, 5, "giant.csv: the largest"},
+    {"ConvertFar",
+     {"convert", "smoke.vdb", "-o", "x.vdb", "--origin", "1e30,0,0"},
+     2,
+     "smoke.vdb: moved by --origin: "},
     {"ConvertHeavy",
      {"convert", "heavy.csv", "-o", "x.vdb"},
      4,
