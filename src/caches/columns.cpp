@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <charconv>
 #include <map>
+#include <set>
 
 #include "photosphere/volume/particle_set.h"
 
@@ -142,6 +143,24 @@ std::vector<ColumnGroup> groupColumns(const std::vector<std::string>& names) {
     ++taken[group.name];
   }
   return groups;
+}
+
+std::string repeatedColumn(const std::vector<std::string>& names,
+                           const std::vector<ColumnGroup>& groups) {
+  static constexpr std::string_view kScalars[] = {"pscale", "mass", "density", "temperature",
+                                                  "age",    "life", "id"};
+  std::set<std::string_view> taken;
+  for (const ColumnGroup& group : groups) {
+    const bool scalar =
+        std::find(std::begin(kScalars), std::end(kScalars), group.name) != std::end(kScalars);
+    // One name for all components is Krakatoa's way to write vectors.
+    std::set<std::string_view> own;
+    for (const std::size_t column : group.columns)
+      if (!own.insert(names[column]).second && scalar) return names[column];
+    for (const std::string_view name : own)
+      if (!taken.insert(name).second) return std::string(name);
+  }
+  return {};
 }
 
 std::vector<std::string> columnNames(std::string_view attribute, int arity) {

@@ -20,6 +20,11 @@ struct ColumnGroup {
 /// What is left becomes an attribute of one component. Group names are unique.
 std::vector<ColumnGroup> groupColumns(const std::vector<std::string>& names);
 
+/// The first name that columns of two groups share, or that an attribute of one number, such as
+/// `pscale`, has twice; empty where there is none. Which of them is meant only the user knows.
+std::string repeatedColumn(const std::vector<std::string>& names,
+                           const std::vector<ColumnGroup>& groups);
+
 /// The scalar column names that stand for an attribute, the inverse of groupColumns.
 std::vector<std::string> columnNames(std::string_view attribute, int arity);
 

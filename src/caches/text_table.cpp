@@ -200,6 +200,11 @@ class TableReader {
                                  m_names.begin() + static_cast<std::ptrdiff_t>(
                                                        std::min<std::size_t>(m_names.size(), 12)),
                                  ", ")));
+    if (const std::string name = repeatedColumn(kept, groups); !name.empty())
+      fail(
+          fmt::format("has several columns '{}'; rename all but one, or leave them out by '-' in "
+                      "option 'columns'",
+                      name));
     m_columns.reserve(groups.size());
     for (ColumnGroup& group : groups) {
       bool text = false;

@@ -63,6 +63,19 @@ TEST(Ply, RefusesACountThatTheFileCannotHold) {
   EXPECT_THROW(readText("ply\nformat binary_little_endian 1.0\n" + header), InputError);
 }
 
+TEST(Ply, RefusesPropertiesOfOneName) {
+  const std::string text =
+      "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
+      "property float z\nproperty float x\nend_header\n1 2 3 4\n";
+  try {
+    readText(text);
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("several properties 'x'"), std::string::npos)
+        << error.what();
+  }
+}
+
 TEST(Ply, RefusesMoreThanItsHeaderCounts) {
   const std::string header =
       "element vertex 1\nproperty char x\nproperty char y\nproperty char z\nelement edge "

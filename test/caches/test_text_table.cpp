@@ -123,6 +123,9 @@ TEST(TextTable, ErrorsNameTheLine) {
   EXPECT_NE(message("a.csv", "x,y,z\n1,2,3\n1,two,3\n").find("'two'"), std::string::npos);
   EXPECT_NE(message("a.csv", "x;y;z\n1,5;2;3\n").find("decimal commas"), std::string::npos);
   EXPECT_NE(message("a.csv", "a,b\n1,2\n").find("columns"), std::string::npos);
+  EXPECT_NE(message("a.csv", "x,y,z,x\n1,2,3,4\n").find("several columns 'x'"), std::string::npos);
+  EXPECT_NE(message("a.csv", "x,y,z,pscale,pscale\n1,2,3,4,5\n").find("several columns 'pscale'"),
+            std::string::npos);
   EXPECT_NE(message("a.pts", "5\n1 2 3\n1 2 3\n").find("truncated"), std::string::npos);
   // More than the count is damage as well, and no count makes room that the file has not.
   EXPECT_NE(message("a.pts", "1\n1 2 3\n1 2 3\n").find("damaged"), std::string::npos);

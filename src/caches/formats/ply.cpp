@@ -24,7 +24,7 @@ bool recognize(std::string_view head) {
 
 // ---- reading
 
-RecordLayout layoutOf(const PlyElement& vertex, const PlyHeader& header) {
+RecordLayout layoutOf(const PlyElement& vertex, const PlyHeader& header, const std::string& path) {
   std::vector<std::string> names;
   std::vector<Component> components;
   RecordLayout layout;
@@ -35,7 +35,12 @@ RecordLayout layoutOf(const PlyElement& vertex, const PlyHeader& header) {
     components.push_back({property.type, layout.stride});
     layout.stride += scalarSize(property.type);
   }
-  for (const ColumnGroup& group : groupColumns(names)) {
+  const std::vector<ColumnGroup> groups = groupColumns(names);
+  if (const std::string name = repeatedColumn(names, groups); !name.empty())
+    throw InputError(
+        path,
+        fmt::format("element 'vertex' has several properties '{}'; rename all but one", name));
+  for (const ColumnGroup& group : groups) {
     Channel channel{group.name, {}, 1};
     for (const std::size_t column : group.columns)
       channel.components.push_back(components[column]);
@@ -51,7 +56,7 @@ RecordLayout layoutOf(const PlyElement& vertex, const PlyHeader& header) {
 volume::ParticleSet readVertices(FileReader& file, const PlyElement& vertex,
                                  const PlyHeader& header) {
   checkCount(file, vertex, header.ascii);
-  const RecordLayout layout = layoutOf(vertex, header);
+  const RecordLayout layout = layoutOf(vertex, header, file.path());
   const bool positions = std::any_of(layout.channels.begin(), layout.channels.end(),
                                      [](const Channel& channel) { return channel.name == "P"; });
   if (!positions)
