@@ -74,7 +74,7 @@ Mat4d lookAt(const Vec3d& eye, const Vec3d& target, const Vec3d& up) {
   const double distance = glm::length(away);
   if (!(distance > 0) || !std::isfinite(distance))
     throw ConfigError(
-        "[camera]: `position` and `look_at` must be two finite, different points; move one of "
+        "`position` and `look_at` must be two finite, different points; move one of "
         "them");
   const Vec3d z = away / distance;
   const double upLength = glm::length(up);
@@ -106,7 +106,7 @@ Mat4d worldFromCameraValues(const ParamValues& common) {
   // Written this way round, so that NaN fails too. Six digits are what text files carry.
   if (!(error < 1e-5) || !affine || !(glm::determinant(rotation) > 0))
     throw ConfigError(
-        "[camera]: `matrix` must be a rotation, one scale for all axes and a translation "
+        "`matrix` must be a rotation, one scale for all axes and a translation "
         "(row-major, "
         "the translation in its last column); it is sheared, mirrored, or transposed");
   const Vec3d x = glm::normalize(rotation[0]);
@@ -133,10 +133,10 @@ std::optional<Projection> Camera::project(const Vec3d& world) const {
 PlacedCamera::PlacedCamera(const Mat4d& worldFromCamera, const Vec2i& resolution, double halfWidth)
     : m_worldFromCamera(worldFromCamera), m_resolution(resolution) {
   if (resolution.x < 1 || resolution.y < 1)
-    throw ConfigError(fmt::format("[camera]: resolution {} x {} holds no pixel; use at least 1 x 1",
+    throw ConfigError(fmt::format("resolution {} x {} holds no pixel; use at least 1 x 1",
                                   resolution.x, resolution.y));
   if (!(halfWidth > 0) || !std::isfinite(halfWidth))
-    throw ConfigError("[camera]: the frame has no width; check fov, focal_length, width");
+    throw ConfigError("the frame has no width; check fov, focal_length, width");
   m_half = {halfWidth, halfWidth * resolution.y / resolution.x};
 }
 

@@ -64,7 +64,7 @@ std::unique_ptr<Camera> create(const ParamValues& values, const Mat4d& worldFrom
   const bool byLens = values.given("focal_length") || values.given("horizontal_aperture");
   if (byLens && values.given("fov"))
     throw ConfigError(
-        "[camera]: `fov` and `focal_length` with `horizontal_aperture` both say how wide the view "
+        "`fov` and `focal_length` with `horizontal_aperture` both say how wide the view "
         "is; "
         "give one of them");
   const double tanHalf = byLens

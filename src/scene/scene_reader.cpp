@@ -63,12 +63,14 @@ const toml::table* SceneReader::table(const std::string& name) const {
 const toml::array* SceneReader::tables(const std::string& name) const {
   const toml::node* node = m_text.root.get(name);
   if (!node) return nullptr;
-  const toml::array* array = node->as_array();
-  const bool good = array && std::all_of(array->cbegin(), array->cend(),
-                                         [](const toml::node& item) { return item.is_table(); });
-  if (!good)
+  const auto refuse = [&](const toml::node& wrong, const std::string& dotted) {
     throw ConfigError(fmt::format("{}: every {} begins with `[[{}]]`, in double brackets",
-                                  where(*node, name, name), name, name));
+                                  where(wrong, dotted, name), name, name));
+  };
+  const toml::array* array = node->as_array();
+  if (!array) refuse(*node, name);
+  for (std::size_t i = 0; i < array->size(); ++i)
+    if (!array->get(i)->is_table()) refuse(*array->get(i), fmt::format("{}.{}", name, i));
   return array;
 }
 

@@ -222,8 +222,16 @@ std::string TomlText::where(const toml::node& node, const std::string& dotted,
     const auto place = sets.find(dotted.substr(0, end));
     if (place != sets.end()) return fmt::format("--set {}: [{}]", place->second, table);
   }
-  if (node.source().begin.line == 0) return fmt::format("{}: [{}]", name, table);
-  return fmt::format("{}:{}: [{}]", name, node.source().begin.line, table);
+  const auto line = node.source().begin.line;
+  std::string place =
+      fmt::format("{}{}: [{}]", name, line == 0 ? "" : fmt::format(":{}", line), table);
+  // Or they are below it: then the table is partly the file's and partly theirs.
+  const std::string below = dotted + ".";
+  for (auto set = sets.lower_bound(below); set != sets.end() && set->first.starts_with(below);
+       ++set)
+    place += fmt::format("{} --set {}",
+                         set->first == sets.lower_bound(below)->first ? " with" : ",", set->second);
+  return place;
 }
 
 TomlText parseToml(const std::string& text, const std::string& name,

@@ -47,7 +47,8 @@ struct TomlText {
   std::string name;                         ///< of the file, for messages
   std::map<std::string, std::string> sets;  ///< dotted path of an override to what the user typed
 
-  /// "scene.toml:12: [table]", or "--set path=value: [table]".
+  /// "scene.toml:12: [table]", or "--set path=value: [table]"; "scene.toml:12: [table] with --set
+  /// path=value" where the override lies in the node.
   /// @param dotted  path of the node, such as `volume.0.file`
   std::string where(const toml::node& node, const std::string& dotted,
                     const std::string& table) const;

@@ -177,6 +177,18 @@ TEST(SceneFileTest, UnknownKeysNameFileLineAndTheKnownOnes) {
                "shot.toml:2: [output]: 'aovs' = 'singel' is unknown; did you mean 'single'?"));
 }
 
+// What only an override made wrong is not the file's fault, wherever it is noticed.
+TEST(SceneFileTest, MistakesOfOverridesNameThem) {
+  EXPECT_TRUE(contains(complaint([] { parse(kSmoke, {"volume.0=4"}); }),
+                       "--set volume.0=4: [volume]: every volume begins with `[[volume]]`"));
+  EXPECT_TRUE(contains(complaint([] { parse(kSmoke, {"volume.0.phase.g=1"}); }),
+                       "[volume.0.phase] with --set volume.0.phase.g=1: "));
+  EXPECT_EQ(parse("[camera]\nposition = [0, 0, 5]\n" + kSmoke,
+                  {"camera.look_at=[0,0,5]", "camera.fov=40"})
+                .cameraWhere,
+            "shot.toml:1: [camera] with --set camera.fov=40, --set camera.look_at=[0,0,5]");
+}
+
 class NotServedTest : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(NotServedTest, IsRefusedAndSaysSo) {
