@@ -7,7 +7,9 @@
 #include <array>
 #include <cctype>
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
+#include <new>
 
 #include "photosphere/core/error.h"
 #include "photosphere/core/log.h"
@@ -154,6 +156,8 @@ ColorConfig ColorConfig::load(const std::string& optionPath) {
     impl->source = path;
     return ColorConfig(std::move(impl));
   } catch (const std::exception& failure) {
+    // OpenColorIO says in words alone that there was no memory.
+    if (std::strstr(failure.what(), "bad_alloc")) throw std::bad_alloc();
     throw InputError(
         path, fmt::format("is not a colour config that OpenColorIO {} can use: {}; correct it, "
                           "or leave it out for the shipped config",

@@ -80,8 +80,10 @@ class MappedLight final : public Light {
   bool isDelta() const override { return false; }
   bool isGrey() const override { return m_map.isGrey(); }
   void addContent(Hasher& hasher) const override { m_map.addContent(hasher); }
-  std::string invalidContent() const override {
-    return m_map.invalid().total() > 0 ? m_map.invalid().text() : std::string();
+  std::optional<InvalidContent> invalidContent() const override {
+    const InvalidPixels& found = m_map.invalid();
+    if (found.total() == 0) return {};
+    return InvalidContent{found.text(), found.nans + found.infinities == 0};
   }
 
  private:

@@ -21,6 +21,10 @@ class LightDepth {
   ///         cannot hold it
   static std::optional<LightDepth> plan(const transport::Medium& medium,
                                         const lights::Light& light);
+  /// Nodes that `fill` computes.
+  std::uint64_t nodes() const {
+    return m_active.size() * static_cast<std::uint64_t>(Field::kBrickSize);
+  }
   /// Memory that `fill` needs while it works.
   std::uint64_t predictedBytes() const;
   /// @param step     largest march step [m]

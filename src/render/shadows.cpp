@@ -45,7 +45,7 @@ constexpr double kThickVoxel = 2;
 constexpr double kThickShare = 0.2;
 
 // The same share of what rays from the camera end in: an eye inside thick smoke sees little else.
-double thickShare(const Medium& medium, std::span<const cameras::CameraRay> rays) {
+double thickShare(const Medium& medium, const std::vector<cameras::CameraRay>& rays) {
   const auto thick = static_cast<float>(kThickVoxel / medium.voxelEdge());
   double all = 0, inThick = 0;
   for (const cameras::CameraRay& ray : rays) {
@@ -67,6 +67,20 @@ double thickShare(const Medium& medium, std::span<const cameras::CameraRay> rays
   return all > 0 ? inThick / all : 0;
 }
 
+// Lookups of extinction that the rays of a frame take to march their shadows: a step at a time, and
+// from each as far again to the lamp; half the box either way.
+double marchedLookups(const Medium& medium, const ShadowUse& use, float step) {
+  double steps = 0;
+  for (const cameras::CameraRay& ray : use.seen)
+    steps += static_cast<double>(transport::clipToMedium(medium, ray.origin, Vec3f(ray.direction),
+                                                         std::numeric_limits<double>::infinity())
+                                     .length /
+                                 step);
+  steps /= static_cast<double>(std::max<std::size_t>(1, use.seen.size()));
+  const double toLamp = 0.5 * glm::length(medium.bounds().extent()) / static_cast<double>(step);
+  return static_cast<double>(use.rays) * steps * toLamp;
+}
+
 // Smoke so few voxels across, in the mean of three directions, has no room for a grid of them: one
 // of four voxels loses 1 to 3 % of the light scattered once. Rays to the lamps are as short, and
 // marched.
@@ -79,12 +93,12 @@ bool isSmall(const Medium& medium) {
 }  // namespace
 
 Shadows::Shadows(const Medium& medium, const transport::LightList& lights, ShadowMode mode,
-                 float step, std::uint64_t budgetBytes, std::span<const cameras::CameraRay> seen)
+                 float step, std::uint64_t budgetBytes, const ShadowUse& use)
     : m_medium(&medium), m_mode(mode), m_step(step), m_tabulated(lights.size()) {
   if (mode != ShadowMode::grid || medium.bounds().empty()) return;
   const double ofAll =
       medium.majorants().shareAbove(static_cast<float>(kThickVoxel / medium.voxelEdge()));
-  if (const double share = std::max(ofAll, thickShare(medium, seen)); share > kThickShare) {
+  if (const double share = std::max(ofAll, thickShare(medium, use.seen)); share > kThickShare) {
     log::info(
         "{:.0f} % of the smoke{} is thicker than {} optical depths a voxel: no grid holds its "
         "shadows, they are tracked (render.shadow = \"track\")",
@@ -115,10 +129,14 @@ Shadows::Shadows(const Medium& medium, const transport::LightList& lights, Shado
   }
   if (medium.isColoured() && !medium.tint()) m_channels = 3;
   const std::vector<Layer> wanted = layers();
+  const double most =
+      use.rays > 0 ? marchedLookups(medium, use, step) : std::numeric_limits<double>::infinity();
   std::optional<transport::SupportLattice> lattice;
   for (std::size_t i = 0; i < lights.size(); ++i) {
     if (!lights[i]->isDelta()) continue;
     const std::optional<LightDepth> depth = LightDepth::plan(medium, *lights[i]);
+    // A small frame is done sooner than a grid of much smoke, or of many times of the shutter.
+    if (depth && static_cast<double>(depth->nodes() * wanted.size()) > most) continue;
     if (!depth && !lattice) lattice.emplace(medium, medium.voxelEdge(), 0);
     const std::uint64_t bytes = wanted.size() * (depth ? depth->predictedBytes()
                                                        : lattice->activeBricks().size() *

@@ -37,17 +37,19 @@ std::uint64_t shadowBudget(const FrameSetup& setup) {
   return setup.memoryBudget > used ? setup.memoryBudget - used : 1;
 }
 
-// A few rays of the camera, spread over the frame, in local space.
-std::vector<cameras::CameraRay> raysOver(const FrameSetup& setup) {
+render::ShadowUse shadowUse(const FrameSetup& setup, int samples) {
   constexpr int kRays = 16;  // across, and down
-  std::vector<cameras::CameraRay> rays;
+  render::ShadowUse use;
   const Vec2d size(setup.camera->resolution());
   for (int y = 0; y < kRays; ++y)
     for (int x = 0; x < kRays; ++x) {
-      rays.push_back(setup.camera->ray((Vec2d(x, y) + 0.5) / static_cast<double>(kRays) * size));
-      rays.back().origin = setup.space.localFromWorld(rays.back().origin);
+      use.seen.push_back(
+          setup.camera->ray((Vec2d(x, y) + 0.5) / static_cast<double>(kRays) * size));
+      use.seen.back().origin = setup.space.localFromWorld(use.seen.back().origin);
     }
-  return rays;
+  // A crop has the shadows of its frame, and so its pixels.
+  use.rays = static_cast<std::uint64_t>(size.x * size.y) * static_cast<std::uint64_t>(samples);
+  return use;
 }
 
 render::FrameOptions frameOptions(const SceneFile& scene, const render::Crop& crop,
@@ -97,7 +99,7 @@ LayerRenderer::LayerRenderer(const SceneFile& scene, const render::Crop& crop,
                         : render::ShadowMode::march;  // tabulates nothing
   m_shadows.emplace(*setup.medium, setup.lights, mode,
                     m_march.step * static_cast<float>(setup.medium->voxelEdge()),
-                    shadowBudget(setup), raysOver(setup));
+                    shadowBudget(setup), shadowUse(setup, m_options.samples));
 }
 
 render::FrameLayers LayerRenderer::render(const estimators::InscatterSource* source, int pass,

@@ -38,7 +38,7 @@ class SentPower {
   }
   void add(const lights::Light& light, const std::string& what) {
     if (m_dark) return;
-    const Vec3d power(light.power(m_bounds));
+    const Vec3d power(light.roughPower(m_bounds));
     const bool numbers = std::isfinite(power.x + power.y + power.z);
     add(numbers ? lights::largestPower(Rgb(power)) : kInfinity, what, "intensity");
   }
@@ -60,13 +60,13 @@ void addEmission(const SceneFile& scene, const transport::Medium& medium, SentPo
 
 void heedInvalid(const SceneFile& scene, const lights::Light& light, const std::string& file,
                  FrameSetup& setup) {
-  const std::string found = light.invalidContent();
-  if (found.empty()) return;
-  if (!scene.allowInvalid)
+  const auto found = light.invalidContent();
+  if (!found) return;
+  if (!found->finite && !scene.allowInvalid)
     throw InputError(file, fmt::format("a light's picture holds {}; clean it, or give "
                                        "--allow-invalid to treat them as zero",
-                                       found));
-  setup.notes.push_back(fmt::format("{}: {}; all are treated as zero", file, found));
+                                       found->what));
+  setup.notes.push_back(fmt::format("{}: {}; all are treated as zero", file, found->what));
 }
 
 }  // namespace

@@ -27,7 +27,7 @@ struct SlabRadiance {
   /// @param effort  0 = the case's photons; 1 and 2 = more, for directions in which few leave
   std::vector<std::string> settings(const Direction& direction, std::size_t effort) const;
   /// Radiance per unit irradiance below which effort 1 and 2 are called for [1/sr].
-  static constexpr std::array kDim{1e-2, 1e-3};
+  static constexpr std::array kDim{4e-2, 1e-3};
 };
 
 /// Slabs of `g` with tau <= 8 and their directions of mu >= 0.3. @param quick  tau 2, three mu

@@ -4,6 +4,7 @@
 #include <array>
 #include <cctype>
 #include <cmath>
+#include <limits>
 #include <type_traits>
 #include <utility>
 
@@ -44,6 +45,13 @@ Attribute& ParticleSet::add(Attribute attribute) {
   return attributes.emplace_back(std::move(attribute));
 }
 
+bool isPlace(const Vec3d& position) {
+  constexpr auto most = static_cast<double>(std::numeric_limits<float>::max());
+  for (int axis = 0; axis < 3; ++axis)
+    if (!(std::abs(position[axis]) <= most)) return false;
+  return true;
+}
+
 Box3d ParticleSet::bounds() const {
   Box3d box;
   for (const Vec3d& p : positions)
@@ -55,9 +63,7 @@ Box3d ParticleSet::bounds() const {
 std::vector<std::size_t> ParticleSet::removeUnplaced() {
   std::vector<std::size_t> unplaced;
   for (std::size_t i = 0; i < positions.size(); ++i)
-    if (const Vec3d& p = positions[i];
-        !std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
-      unplaced.push_back(i);
+    if (!isPlace(positions[i])) unplaced.push_back(i);
   // Elements of those particles, `arity` each; what is behind moves up.
   const auto removeFrom = [&](auto& column, std::size_t arity) {
     std::size_t to = 0;

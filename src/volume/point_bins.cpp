@@ -5,27 +5,20 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <tuple>
 
 #include "photosphere/core/error.h"
 #include "photosphere/core/parallel.h"
+#include "photosphere/volume/particle_set.h"
 
 namespace photosphere::volume {
 
 namespace {
 
-// As floats, which smoke is made of. One particle farther than that, garbage of a simulation, would
-// make voxels so large that all others are at one place of one of them.
-bool isFinite(const Vec3d& p) {
-  return maxComponent(glm::abs(p)) <= static_cast<double>(std::numeric_limits<float>::max()) &&
-         p.x == p.x && p.y == p.y && p.z == p.z;
-}
-
 Box3d finiteBounds(const std::vector<Vec3d>& positions) {
   Box3d box;
   for (const Vec3d& p : positions)
-    if (isFinite(p)) box.grow(p);
+    if (isPlace(p)) box.grow(p);
   return box;
 }
 
@@ -46,7 +39,7 @@ std::vector<std::uint64_t> mortonCodes(const std::vector<Vec3d>& positions, cons
   std::vector<std::uint64_t> codes;
   codes.reserve(positions.size());
   for (const Vec3d& p : positions) {
-    if (!isFinite(p)) continue;
+    if (!isPlace(p)) continue;
     const Vec3d cell = (p - box.min) * scale;
     codes.push_back(spread(static_cast<std::uint64_t>(cell.x)) |
                     spread(static_cast<std::uint64_t>(cell.y)) << 1 |
@@ -72,7 +65,7 @@ std::vector<PointBin> binPoints(const std::vector<Vec3d>& positions,
   std::vector<PointBin> bins;
   bins.reserve(positions.size());
   for (std::size_t i = 0; i < positions.size(); ++i) {
-    if (!isFinite(positions[i])) continue;
+    if (!isPlace(positions[i])) continue;
     const openvdb::Vec3d index = transform.worldToIndex(toOpenVdb(positions[i]));
     const Vec3d rounded = glm::floor(fromOpenVdb(index) + 0.5);
     if (maxComponent(glm::abs(rounded)) > 0x1.fp30)

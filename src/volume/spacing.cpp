@@ -43,11 +43,8 @@ double nearestOther(const Tree& tree, const Points& points, std::uint32_t query)
 double medianSpacing(const ParticleSet& particles) {
   Points points{particles.positions, {}};
   points.finite.reserve(particles.size());
-  for (std::size_t i = 0; i < particles.size(); ++i) {
-    const Vec3d& p = particles.positions[i];
-    if (std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z))
-      points.finite.push_back(static_cast<std::uint32_t>(i));
-  }
+  for (std::size_t i = 0; i < particles.size(); ++i)
+    if (isPlace(particles.positions[i])) points.finite.push_back(static_cast<std::uint32_t>(i));
   const std::size_t count = points.finite.size();
   if (count < 2) return 0;
   const Tree tree(3, points, nanoflann::KDTreeSingleIndexAdaptorParams(32));

@@ -142,9 +142,13 @@ TEST_F(Sky, IsHashedByItsPixels) {
 
 TEST_F(Sky, NamesPixelsThatAreNoLight) {
   image::Image picture = sky(8, 4);
-  EXPECT_EQ(light(picture)->invalidContent(), "");
+  EXPECT_FALSE(light(picture)->invalidContent());
   const Rgb upper = light(picture)->background({0, 1, 0});
   picture.channel("G")[picture.index(3, 2)] = -0.5f;
+  const auto below = light(picture)->invalidContent();
+  ASSERT_TRUE(below);
+  EXPECT_TRUE(below->finite);
+  EXPECT_EQ(below->what, "0 NaN, 0 infinite and 1 negative pixels, the first (-0.5) at (3, 2)");
   picture.channel("R")[picture.index(5, 2)] = 1234.5f;
   picture.channel("B")[picture.index(5, 2)] = -1.0f;
   picture.channel("B")[picture.index(6, 3)] = 5432.1f;
@@ -156,7 +160,9 @@ TEST_F(Sky, NamesPixelsThatAreNoLight) {
   test::replaceFloats(file, 1234.5f, std::numeric_limits<float>::infinity());
   test::replaceFloats(file, 5432.1f, std::numeric_limits<float>::quiet_NaN());
   const auto map = makeLight("environment", {{"file", file.string()}});
-  EXPECT_EQ(map->invalidContent(),
+  ASSERT_TRUE(map->invalidContent());
+  EXPECT_FALSE(map->invalidContent()->finite);
+  EXPECT_EQ(map->invalidContent()->what,
             "1 NaN, 1 infinite and 1 negative pixels, the first (-0.5) at (3, 2)");
   EXPECT_EQ(map->background({0, 1, 0}), upper);
   EXPECT_TRUE(std::isfinite(maxComponent(map->power({Vec3d(0), 1}))));

@@ -144,6 +144,28 @@ TEST(Shadows, GridsAreForSmokeOfFewDepthsAVoxel) {
   EXPECT_GT(bytes([](const Vec3d& p) { return glm::length(p) < 0.15 ? 20.0 : 0.3; }), 0u);
 }
 
+// An eye in the knot sees nothing else; a frame of few rays marches theirs sooner than it makes a
+// grid.
+TEST(Shadows, GridsAreForWhatTheFrameAsks) {
+  const transport::Medium medium =
+      makeMedium(sampledVolume(2.0, 48, {0.8, 0.0, 1 / (2.0 / 48)},
+                               [](const Vec3d& p) { return glm::length(p) < 0.3 ? 20.0 : 0.3; }));
+  transport::LightList lights;
+  lights.push_back(makeLight("directional", {{"position", "[0, 0, 1]"}}));
+  const auto gridOf = [&](const Vec3d& eye, std::uint64_t rays) {
+    render::ShadowUse use;
+    use.rays = rays;
+    for (int i = 0; i < 16; ++i)
+      use.seen.push_back(
+          {eye, glm::normalize(Vec3d(0.1 * (i % 4 - 1.5), 0.1 * (i / 4 - 1.5), -1))});
+    return render::Shadows(medium, lights, ShadowMode::grid, 0.04f, 0, use).memoryBytes() > 0;
+  };
+  EXPECT_TRUE(gridOf({0, 0, 5}, 100'000)) << "thin smoke hides the knot";
+  EXPECT_FALSE(gridOf({0, 0, 0}, 100'000));
+  EXPECT_FALSE(gridOf({0, 0, 5}, 10));
+  EXPECT_FALSE(gridOf({0, 0, -5}, 100'000)) << "rays that meet nothing ask for nothing";
+}
+
 // Between the nodes of so few the slope of the depth at the faces would be lost.
 TEST(Shadows, SmokeOfFewVoxelsHasNoGrid) {
   const double sigma = 1.5;

@@ -2,6 +2,7 @@
 
 #include "photosphere/core/registry.h"
 #include "photosphere/core/resources.h"
+#include "support/support.h"
 
 namespace photosphere::test {
 

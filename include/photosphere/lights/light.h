@@ -66,6 +66,12 @@ struct Place {
   double extent = 0.0;  ///< no point of the lamp lies farther from there [m]
 };
 
+/// Pixels that are no light.
+struct InvalidContent {
+  std::string what;     ///< how many there are, and the first of them
+  bool finite = false;  ///< all are numbers below 0, as filters of pictures leave them
+};
+
 class Light {
  public:
   virtual ~Light() = default;
@@ -108,8 +114,8 @@ class Light {
   virtual bool isGrey() const = 0;
   /// Adds what decides its light and is not among its options: the content of files.
   virtual void addContent(Hasher& hasher) const { (void)hasher; }
-  /// What its files hold that is no light and counts as 0; empty = nothing.
-  virtual std::string invalidContent() const { return {}; }
+  /// What its files hold that is no light and counts as 0; nothing = all is light.
+  virtual std::optional<InvalidContent> invalidContent() const { return {}; }
 
  private:
   std::string m_name;

@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
-#include <span>
 #include <vector>
 
 #include "photosphere/cameras/camera.h"
@@ -24,6 +23,15 @@ enum class ShadowMode {
   track,  ///< ratio tracking, unbiased and noisy
 };
 
+/// What asks for shadows.
+struct ShadowUse {
+  /// Some rays of the camera, spread over the frame, local space: smoke whose shadows a grid cannot
+  /// hold counts where these end as it does in all the smoke.
+  std::vector<cameras::CameraRay> seen = {};
+  /// Rays of the frame, where a grid must take less work than they do without; 0 = it need not.
+  std::uint64_t rays = 0;
+};
+
 /// Shadows of every lamp of a frame. Reading is thread-safe.
 class Shadows {
  public:
@@ -31,10 +39,9 @@ class Shadows {
   /// those of volumes whose extinctions have different colours, for each channel.
   /// @param step         march step [m]
   /// @param budgetBytes  grids past it fall back to `march`, said in the log; 0 = no limit
-  /// @param seen         rays of the camera, local space; smoke whose shadows a grid cannot hold
-  ///                     counts as much where these end as in all the smoke
+  /// @param use          nothing = of any number of rays from anywhere
   Shadows(const transport::Medium& medium, const transport::LightList& lights, ShadowMode mode,
-          float step, std::uint64_t budgetBytes, std::span<const cameras::CameraRay> seen = {});
+          float step, std::uint64_t budgetBytes, const ShadowUse& use = {});
   ~Shadows();
 
   /// Transmittance from `p` to lamp `light` [0, 1].

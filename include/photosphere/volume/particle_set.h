@@ -30,6 +30,10 @@ struct Attribute {
   double number(std::size_t i, int c = 0) const;
 };
 
+/// Whether a position is one: finite, as the floats are that smoke is made of. Garbage that is
+/// farther away would make voxels so large that all other particles are at one place of one.
+bool isPlace(const Vec3d& position);
+
 /// Particles of one frame: positions in world space [scene units] and attributes under Houdini
 /// names
 /// (`v pscale id Cd density temperature age mass`).
