@@ -51,8 +51,9 @@ Resource exhausted() noexcept {
     if (error.code() == std::errc::resource_unavailable_try_again) return Resource::threads;
     if (error.code() == std::errc::not_enough_memory) return Resource::memory;
   } catch (const std::exception& error) {
-    // TBB says it in words alone.
+    // TBB and OpenColorIO say it in words alone.
     if (std::strstr(error.what(), "pthread_create has failed")) return Resource::threads;
+    if (std::strstr(error.what(), "bad_alloc")) return Resource::memory;
   } catch (...) {
   }
   return Resource::none;

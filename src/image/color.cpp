@@ -7,11 +7,10 @@
 #include <array>
 #include <cctype>
 #include <cstdlib>
-#include <cstring>
 #include <filesystem>
-#include <new>
 
 #include "photosphere/core/error.h"
+#include "photosphere/core/exhaustion.h"
 #include "photosphere/core/log.h"
 #include "photosphere/core/shipped_data.h"
 
@@ -156,8 +155,7 @@ ColorConfig ColorConfig::load(const std::string& optionPath) {
     impl->source = path;
     return ColorConfig(std::move(impl));
   } catch (const std::exception& failure) {
-    // OpenColorIO says in words alone that there was no memory.
-    if (std::strstr(failure.what(), "bad_alloc")) throw std::bad_alloc();
+    if (exhausted() != Resource::none) throw;  // nothing is wrong with the config
     throw InputError(
         path, fmt::format("is not a colour config that OpenColorIO {} can use: {}; correct it, "
                           "or leave it out for the shipped config",

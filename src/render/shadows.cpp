@@ -47,13 +47,20 @@ constexpr double kThickShare = 0.2;
 // smoke, which sees nothing else, 25 %.
 constexpr double kThickSeen = 0.5;
 
+// The parts of the camera's rays that lie in the smoke.
+std::vector<Segment> partsInside(const Medium& medium, const ShadowUse& use) {
+  std::vector<Segment> parts;
+  for (const cameras::CameraRay& ray : use.seen)
+    parts.push_back(transport::clipToMedium(medium, ray.origin, Vec3f(ray.direction),
+                                            std::numeric_limits<double>::infinity()));
+  return parts;
+}
+
 // The same share of what rays from the camera end in: an eye inside thick smoke sees little else.
-double thickShare(const Medium& medium, const std::vector<cameras::CameraRay>& rays) {
+double thickShare(const Medium& medium, const std::vector<Segment>& rays) {
   const auto thick = static_cast<float>(kThickVoxel / medium.voxelEdge());
   double all = 0, inThick = 0;
-  for (const cameras::CameraRay& ray : rays) {
-    const Segment inside = transport::clipToMedium(medium, ray.origin, Vec3f(ray.direction),
-                                                   std::numeric_limits<double>::infinity());
+  for (const Segment& inside : rays) {
     float through = 1.0f;
     for (volume::MajorantGrid::Walk walk(medium.majorants(), inside.origin, inside.direction, 0.0f,
                                          inside.length);
@@ -72,16 +79,14 @@ double thickShare(const Medium& medium, const std::vector<cameras::CameraRay>& r
 
 // Lookups of extinction that the rays of a frame take to march their shadows: a step at a time, and
 // from each as far again to the lamp; half the box either way.
-double marchedLookups(const Medium& medium, const ShadowUse& use, float step) {
+double marchedLookups(const Medium& medium, const std::vector<Segment>& some, std::uint64_t rays,
+                      float step) {
   double steps = 0;
-  for (const cameras::CameraRay& ray : use.seen)
-    steps += static_cast<double>(transport::clipToMedium(medium, ray.origin, Vec3f(ray.direction),
-                                                         std::numeric_limits<double>::infinity())
-                                     .length /
-                                 step);
-  steps /= static_cast<double>(std::max<std::size_t>(1, use.seen.size()));
+  for (const Segment& inside : some)
+    steps += static_cast<double>(inside.length / step);
+  steps /= static_cast<double>(std::max<std::size_t>(1, some.size()));
   const double toLamp = 0.5 * glm::length(medium.bounds().extent()) / static_cast<double>(step);
-  return static_cast<double>(use.rays) * steps * toLamp;
+  return static_cast<double>(rays) * steps * toLamp;
 }
 
 // Smoke so few voxels across, in the mean of three directions, has no room for a grid of them: one
@@ -101,7 +106,8 @@ Shadows::Shadows(const Medium& medium, const transport::LightList& lights, Shado
   if (mode != ShadowMode::grid || medium.bounds().empty()) return;
   const double ofAll =
       medium.majorants().shareAbove(static_cast<float>(kThickVoxel / medium.voxelEdge()));
-  const double ofSeen = thickShare(medium, use.seen);
+  const std::vector<Segment> seen = partsInside(medium, use);
+  const double ofSeen = thickShare(medium, seen);
   if (ofAll > kThickShare || ofSeen > kThickSeen) {
     log::info(
         "{:.0f} % of the smoke{} is thicker than {} optical depths a voxel: no grid holds its "
@@ -133,8 +139,8 @@ Shadows::Shadows(const Medium& medium, const transport::LightList& lights, Shado
   }
   if (medium.isColoured() && !medium.tint()) m_channels = 3;
   const std::vector<Layer> wanted = layers();
-  const double most =
-      use.rays > 0 ? marchedLookups(medium, use, step) : std::numeric_limits<double>::infinity();
+  const double most = use.rays > 0 ? marchedLookups(medium, seen, use.rays, step)
+                                   : std::numeric_limits<double>::infinity();
   std::optional<transport::SupportLattice> lattice;
   for (std::size_t i = 0; i < lights.size(); ++i) {
     if (!lights[i]->isDelta()) continue;

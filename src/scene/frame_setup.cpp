@@ -132,9 +132,6 @@ bool isDeep(const FrameSetup& setup, double depth) {
   const auto extinction = static_cast<float>(depth / lightVoxelEdge(setup));
   return setup.medium->majorants().shareAbove(extinction) > kThickShare;
 }
-bool isThick(const FrameSetup& setup) {
-  return isDeep(setup, kThickVoxel);
-}
 
 // How much denser smoke is than within a light voxel around it, in the mean over the smoke: 0 where
 // it is even, 0.1 in shipped simulations, 0.6 in a cloud of balls of two light voxels. Light that
@@ -179,7 +176,7 @@ void chooseSmoothing(const ParamValues& e, FrameSetup& setup) {
   using namespace estimators;
   LightFieldLayout& l = setup.layout;
   if (e.text("type") != "photosphere" || e.given("smoothing") || !e.text("cache").empty() ||
-      l.holdsPower() || setup.medium->bounds().empty() || !isThick(setup))
+      l.holdsPower() || setup.medium->bounds().empty() || !isDeep(setup, kThickVoxel))
     return;
   l.smoothing = Smoothing::visible;
   setup.notes.push_back(

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <charconv>
 #include <optional>
+#include <utility>
 
 #include "photosphere/core/error.h"
 
@@ -227,10 +228,10 @@ std::string TomlText::where(const toml::node& node, const std::string& dotted,
       fmt::format("{}{}: [{}]", name, line == 0 ? "" : fmt::format(":{}", line), table);
   // Or they are below it: then the table is partly the file's and partly theirs.
   const std::string below = dotted + ".";
+  const char* between = " with";
   for (auto set = sets.lower_bound(below); set != sets.end() && set->first.starts_with(below);
        ++set)
-    place += fmt::format("{} --set {}",
-                         set->first == sets.lower_bound(below)->first ? " with" : ",", set->second);
+    place += fmt::format("{} --set {}", std::exchange(between, ","), set->second);
   return place;
 }
 
