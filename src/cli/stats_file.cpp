@@ -1,8 +1,10 @@
 #include "stats_file.h"
 
+#include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "photosphere/core/error.h"
 #include "photosphere/core/frames.h"
 #include "photosphere/core/log.h"
 #include "photosphere/core/output_file.h"
@@ -18,7 +20,30 @@ void write(const std::string& path, const Json& json) {
   writeFile(path, json.dump(2, ' ', false, Json::error_handler_t::replace) + '\n');
 }
 
+/// The library copies and writes values by recursion; ours are five deep.
+constexpr int kMostDepth = 32;
+
 }  // namespace
+
+Json readStatsFile(const std::string& path) {
+  const auto damaged = [&](const std::string& how) {
+    return InputError(path, how + "; it is no file of --stats with several frames");
+  };
+  std::ifstream in(path, std::ios::binary);
+  if (!in) throw InputError(path, "cannot be opened");
+  Json frames = Json::parse(
+      in,
+      [&](int depth, Json::parse_event_t, Json&) {
+        if (depth > kMostDepth) throw damaged("has values within values without end");
+        return true;
+      },
+      false);
+  if (!frames.is_array()) throw damaged("is damaged");
+  for (const Json& object : frames)
+    if (!object.is_object() || !object.contains("frame") || !object["frame"].is_number_integer())
+      throw damaged("holds something else than frames");
+  return frames;
+}
 
 StatsFile::StatsFile(std::string path, std::size_t frames)
     : m_path(std::move(path)),
@@ -40,18 +65,18 @@ void StatsFile::add(std::int64_t frame, const std::string& output,
 void StatsFile::keep(std::int64_t frame) {
   if (m_path.empty() || hasFrameToken(m_path)) return;
   if (!m_earlier) {
-    std::ifstream in(m_path);
-    m_earlier = std::make_unique<Json>(Json::parse(in, nullptr, false));
-    if (in.is_open() && !m_earlier->is_array())
-      log::warning(
-          "{}: is damaged, and what it said of the frames that are kept is lost; --resume "
-          "never makes them again",
-          m_path);
+    m_earlier = std::make_unique<Json>(Json::array());
+    std::error_code error;
+    if (std::filesystem::exists(m_path, error)) try {
+        *m_earlier = readStatsFile(m_path);
+      } catch (const InputError& damage) {
+        log::warning(
+            "{}; what it said of the frames that are kept is lost; --resume never makes them again",
+            damage.what());
+      }
   }
-  if (!m_earlier->is_array()) return;
   for (const Json& object : *m_earlier)
-    if (object.is_object() && object.contains("frame") && object["frame"] == frame)
-      m_frames->push_back(object);
+    if (object["frame"] == frame) m_frames->push_back(object);
 }
 
 }  // namespace photosphere::cli

@@ -11,6 +11,10 @@
 
 namespace photosphere::cli {
 
+/// What a file of --stats says of several frames: an array of objects, each with its `frame`.
+/// @throws InputError  the file cannot be read as that
+nlohmann::ordered_json readStatsFile(const std::string& path);
+
 /// Collects the statistics of frames. A path with `####` gets one file a frame; else the file holds
 /// one object where one frame is made and an array of objects where there are several. It is
 /// written after each frame, so that a run that was stopped leaves what it has done.

@@ -41,7 +41,7 @@ std::vector<Specimen> damagedOnes() {
 /// letter. OpenImageIO fills the rest of a cut JPEG, TGA or LZW TIFF with one colour.
 bool mayBeCut(const std::string& target) {
   static const std::set<std::string> all{"csv",  "pts",    "scene", "overrides", "frames",
-                                         "chan", "detect", "ocio",  "picture"};
+                                         "chan", "detect", "ocio",  "picture",   "stats"};
   return all.count(target) != 0;
 }
 

@@ -354,6 +354,10 @@ aovs = ["beauty", 'single']
                  "# frame, translation, rotation, field of view\n1 0 0 5 0 0 0 40\n"
                  "2\t+0.5 -1e-1 5 10 20 -30 41.5\r\n\n3 1 0 5 0 0 0 42\n"});
   all.push_back({"checkpoint", "part", checkpointPart()});
+  all.push_back({"stats", "two_frames",
+                 R"([{"frame": 1, "output": "a.0001.exr", "seconds": {"total": 1.5e0}},
+ {"frame": -2, "output": "\u00fc", "energy_watts": {"emitted": [1, 2, null]}, "why": ["a", true]}]
+)"});
 }
 
 }  // namespace

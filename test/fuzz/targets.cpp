@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <stdexcept>
 
@@ -21,6 +22,7 @@
 #include "photosphere/image/load.h"
 #include "photosphere/scene/scene_file.h"
 #include "photosphere/volume/vdb_file.h"
+#include "stats_file.h"
 #include "support/uni_files.h"
 #include "vdb_walk.h"
 
@@ -292,6 +294,13 @@ void addTexts(std::vector<Target>& all) {
        [](const std::string& bytes, const fs::path&) { cameras::parseChan(bytes, "shot.chan"); },
        false});
   all.push_back({"checkpoint", readCheckpoint, false});
+  all.push_back({"stats",
+                 [](const std::string& bytes, const fs::path& folder) {
+                   const fs::path path = place(folder, "stats.json", bytes);
+                   require(!cli::readStatsFile(path).dump().empty(), "cannot be written again");
+                 },
+                 false,
+                 {"[{\"frame\": 1, ", "\"output\": \"", "\\u0000", "null", "true", "1e9"}});
 }
 
 }  // namespace
