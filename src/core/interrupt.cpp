@@ -13,15 +13,15 @@ namespace photosphere {
 
 namespace {
 
-volatile sig_atomic_t g_signal = 0;
+std::atomic<int> g_signal{0};
 std::atomic<int> g_delays{0};
+static_assert(std::atomic<int>::is_always_lock_free);  // for handlers
 
 void onSignal(int signal) {
-  if (g_signal != 0) {
-    removeTemporaries();
-    _exit(128 + signal);
-  }
-  g_signal = signal;
+  // Two may come at the same time, to two threads.
+  if (g_signal.exchange(signal) == 0) return;
+  removeTemporaries();
+  _exit(128 + signal);
 }
 
 }  // namespace

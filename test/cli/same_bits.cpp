@@ -391,6 +391,32 @@ TEST_F(Interrupted, EndsWith75AndGoesOn) {
   EXPECT_NE(result.err.find("no checkpoint"), std::string::npos) << result.err;
 }
 
+// What a trace was stopped at is gone on with to the light, and the pixels, of an undisturbed one.
+TEST_F(Interrupted, ATraceEndsWith75AndGoesOn) {
+  const std::string trace = "trace scene.toml --frames 1 -s estimator.photons=" +
+                            std::to_string(kSanitized ? 600000 : 3000000);
+  const RunResult stopped =
+      signalAt(trace + " -o x.vdb --checkpoint-interval 0.1", "x.vdb.checkpoint/light");
+  ASSERT_EQ(stopped.exitCode, 75) << stopped.err;
+  EXPECT_NE(stopped.err.find("x.vdb.checkpoint"), std::string::npos) << stopped.err;
+  EXPECT_FALSE(fs::exists(m_folder / "x.vdb"));
+  const RunResult rest = runShell(
+      std::string(PHOTOSPHERE_TOOL) + " " + trace + " -o x.vdb --resume require", m_folder.path());
+  ASSERT_EQ(rest.exitCode, 0) << rest.err;
+  EXPECT_NE(rest.err.find("goes on from"), std::string::npos) << rest.err;
+  EXPECT_FALSE(fs::exists(m_folder / "x.vdb.checkpoint"));
+  const RunResult whole =
+      runShell(std::string(PHOTOSPHERE_TOOL) + " " + trace + " -o whole.vdb", m_folder.path());
+  ASSERT_EQ(whole.exitCode, 0) << whole.err;
+  for (const std::string name : {"x", "whole"}) {
+    const RunResult seen =
+        run({"render", "scene.toml", "-o", name + ".exr", "--frames", "1", "--float", "-s",
+             "estimator.cache=" + (m_folder / (name + ".vdb")).string()});
+    ASSERT_EQ(seen.exitCode, 0) << seen.err;
+  }
+  expectSamePixels("whole.exr", "x.exr");
+}
+
 // A checkpoint between two frames says which are done.
 TEST_F(Interrupted, FinishedFramesAreNotMadeAgain) {
   const std::string job =
@@ -475,6 +501,30 @@ TEST_F(Interrupted, EverySignalLeavesAtMostACheckpoint) {
     std::error_code ignored;
     EXPECT_TRUE(fs::remove_all(m_folder / "x.vdb.checkpoint", ignored));
     EXPECT_EQ(namesIn(m_folder.path()), before) << result.err;
+  }
+}
+
+// Both arrive while the program is halted: the second ends it there and then.
+TEST_F(Interrupted, ASecondSignalEndsAtOnceAndLeavesNoTemporaries) {
+  for (const char* work : {"trace scene.toml -o x.vdb -s estimator.photons=100000000",
+                           "render scene.toml -o x.exr -s estimator.type=path_traced -s "
+                           "estimator.samples=1000000"}) {
+    const RunResult result = runShell(
+        std::string(PHOTOSPHERE_TOOL) + " " + work +
+            " --frames 1 --checkpoint-interval 0.1 & pid=$!; while kill -0 $pid 2> /dev/null && "
+            "[ -z \"$(ls x.*.checkpoint 2> /dev/null)\" ]; do sleep 0.01; done; "
+            "kill -s STOP $pid; kill -s TERM $pid; kill -s INT $pid; kill -s CONT $pid; wait $pid",
+        m_folder.path());
+    EXPECT_TRUE(result.exitCode == 128 + 15 || result.exitCode == 128 + 2)
+        << work << ": " << result.exitCode << '\n'
+        << result.err;
+    for (const std::string& name : namesIn(m_folder.path())) {
+      if (!name.starts_with("x.")) continue;
+      EXPECT_TRUE(name.ends_with(".checkpoint")) << name;
+      for (const std::string& part : namesIn(m_folder / name))
+        EXPECT_TRUE(part == "light" || part == "frame" || part == "note") << part;
+      fs::remove_all(m_folder / name);
+    }
   }
 }
 
