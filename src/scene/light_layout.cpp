@@ -1,0 +1,153 @@
+#include "light_layout.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "effect_plan.h"
+#include "estimator_options.h"
+#include "light_notes.h"
+#include "light_voxels.h"
+#include "photosphere/volume/rasterize.h"
+
+namespace photosphere::scene {
+
+namespace {
+
+// Nearest-neighbour spacing of the carriers [m].
+double carrierSpacing(const std::vector<Vec3f>& particles) {
+  volume::ParticleSet set;
+  set.positions.assign(particles.begin(), particles.end());
+  return set.size() > 1 ? volume::medianSpacing(set) : 0.0;
+}
+
+// |g| of the sharpest lobe from where on a photon that happens to fly toward the eye counts so much
+// alone that it leaves a bright block: its direction is smoothed by a kernel of that width, or kept
+// in that many bins, of which fewer are dark there (README.md, bases of directions).
+constexpr double kSharpLobe = 0.85;
+constexpr double kSharpBandwidth = 0.2;  // [rad], epanechnikov
+constexpr int kSharpRows = 4;
+
+// Where the choice is the tool's: what a light cache holds was chosen when it was traced.
+bool smoothsSharpLobes(const ParamValues& e, double sharpest) {
+  return e.text("basis") == "auto" && e.text("type") == "photosphere" && e.text("cache").empty() &&
+         sharpest >= kSharpLobe;
+}
+
+void heedSharpLobes(const ParamValues& e, double sharpest, FrameSetup& setup) {
+  using namespace estimators;
+  LightFieldLayout& l = setup.layout;
+  std::string how;
+  if (l.basis == Basis::view && !e.given("kernel")) {
+    l.angularKernel = sphere::AngularKernel::epanechnikov;
+    l.bandwidth = kSharpBandwidth;
+    how = fmt::format("directions are smoothed over {} rad (estimator.kernel)", l.bandwidth);
+  } else if (l.basis == Basis::histogram && !e.given("rows")) {
+    how = fmt::format("light is stored in {} bins of direction (estimator.rows)", l.bins());
+  }
+  if (!how.empty())
+    setup.notes.push_back(
+        fmt::format("a phase function has a lobe of g = {:.3g}: {}", sharpest, how));
+}
+
+// Angle under which smoke sees the eye move from where it is in the middle of the shutter, up to
+// which light for that one eye serves [rad].
+constexpr double kSmallParallax = 0.1;
+
+void heedParallax(const SceneFile& scene, FrameSetup& setup) {
+  estimators::LightFieldLayout& l = setup.layout;
+  const double parallax = setup.motion ? setup.motion->parallax(setup.worldBounds) : 0.0;
+  if (scene.estimator.text("type") != "photosphere" || l.basis != estimators::Basis::view ||
+      parallax <= kSmallParallax)
+    return;
+  const bool chosen = scene.estimator.text("basis") == "auto";
+  if (chosen) l.basis = estimators::Basis::histogram;
+  setup.notes.push_back(fmt::format(
+      "while the shutter is open the smoke sees the camera move by {:.2g} degrees: light is {}",
+      2 * parallax * 180 / kPi,
+      chosen ? fmt::format("stored in {} bins of direction, which serve every eye", l.bins())
+             : "stored for the eye in the middle; estimator.basis = \"histogram\" serves all"));
+}
+
+constexpr double kHalfDiagonal = 0.8661;  // of a cube of edge 1, and a little
+
+// The radius that the scene states, or one that suits the smoke, within what light voxels can hold.
+void chooseRadius(const ParamValues& e, FrameSetup& setup) {
+  using namespace estimators;
+  LightFieldLayout& l = setup.layout;
+  l.radius = e.real("radius") * setup.space.metersPerUnit;
+  if (!(l.radius > 0)) {
+    l.radius = automaticRadius(*setup.medium, l, static_cast<std::uint64_t>(e.integer("photons")));
+    if (l.carrier == Carrier::particles) {
+      // About 20 particles where they fill space evenly: a ball of 3 spacings. Power is smoothed
+      // with the smoke it was left in, so it takes no more than that: what a wider radius blurs
+      // over the smoke's edge soon exceeds the noise that it removes (README.md).
+      const double spacings = 3.0 * carrierSpacing(setup.particles);
+      l.radius = l.holdsPower() && spacings > 0 ? spacings : std::max(l.radius, spacings);
+    }
+  }
+  // Particles are read by way of light voxels: one whose kernel meets the centre of none would lose
+  // its light.
+  const double narrowest = kHalfDiagonal * l.lightVoxel * setup.medium->voxelEdge();
+  if (l.carrier == Carrier::particles && l.radius < narrowest) {
+    if (e.real("radius") > 0)
+      setup.notes.push_back(fmt::format(
+          "estimator.radius = {:.4g} is less than light voxels are apart; their half diagonal, "
+          "{:.4g}, is taken (lower estimator.light_voxel for less)",
+          e.real("radius"), narrowest / setup.space.metersPerUnit));
+    l.radius = narrowest;
+  }
+  const Vec3d extent = setup.medium->bounds().extent();
+  const double across = std::max({extent.x, extent.y, extent.z});
+  if (e.real("radius") > 0 && !setup.medium->bounds().empty() && l.radius > across &&
+      (l.carrier == Carrier::particles || e.text("type") == "photon_map"))
+    setup.notes.push_back(fmt::format(
+        "estimator.radius = {:.4g} is wider than the smoke, {:.4g}: light scattered many times is "
+        "spread far over its edge (0 chooses a radius)",
+        e.real("radius"), across / setup.space.metersPerUnit));
+  const double widest = kMostVoxelsWide * l.lightVoxel * setup.medium->voxelEdge();
+  if (e.text("type") == "photosphere" && !l.holdsPower() && l.radius > widest) {
+    setup.notes.push_back(
+        fmt::format("estimator.radius = {:.4g} spans {:.3g} light voxels; {} are the most that "
+                    "light is smoothed over, {:.4g} (raise estimator.light_voxel for more)",
+                    e.real("radius"), l.radius / (l.lightVoxel * setup.medium->voxelEdge()),
+                    kMostVoxelsWide, widest / setup.space.metersPerUnit));
+    l.radius = widest;
+  }
+  const double deposit = e.real("deposit_radius") * setup.space.metersPerUnit;
+  l.depositRadius = deposit > 0 ? deposit : l.radius;
+}
+
+}  // namespace
+
+void chooseLayout(const SceneFile& scene, bool forLightCache, FrameSetup& setup) {
+  using namespace estimators;
+  const ParamValues& e = scene.estimator;
+  LightFieldLayout& l = setup.layout;
+  const bool cached = forLightCache || !e.text("cache").empty();
+  l = layoutOf(e, cached);
+  const double sharpest = sharpestLobe(*setup.medium);
+  const bool sharp = smoothsSharpLobes(e, sharpest);
+  if (sharp && !e.given("rows")) l.rows = kSharpRows;  // should it come to bins
+  // Light without directions serves every eye.
+  const bool even = scattersEvenly(*setup.medium);
+  if (!even) heedParallax(scene, setup);
+  if (sharp) heedSharpLobes(e, sharpest, setup);
+  // Bins would all be read alike: one coefficient holds what counts.
+  const bool ofBins = l.direction != sphere::DirectionDeposit::nearest ||
+                      l.representative != Representative::bin || l.merge != Merge::full ||
+                      l.angularKernel != sphere::AngularKernel::none;
+  if (e.text("basis") == "auto" && l.basis == Basis::histogram && !ofBins && even) {
+    l.basis = Basis::sphericalHarmonics;
+    l.order = 0;
+  }
+  l.channels = setup.effects.chromatic ? 3 : 1;
+  l.phases = static_cast<int>(setup.medium->phases().size());
+  for (const auto& light : setup.lights)
+    l.unscattered = l.unscattered || (!light->isDelta() && setup.effects.singleScattering);
+  chooseSmoothing(e, setup);
+  chooseLightVoxel(e, setup);
+  chooseRadius(e, setup);
+}
+
+}  // namespace photosphere::scene

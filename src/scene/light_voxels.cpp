@@ -1,0 +1,121 @@
+#include "light_voxels.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <utility>
+
+#include "photosphere/core/rng.h"
+
+namespace photosphere::scene {
+
+namespace {
+
+// Light is kept in voxels of two density voxels unless the scene says otherwise, or the smoke is
+// few of them across, several mean free paths deep in each, or in clumps of their size: what light
+// does inside a voxel is lost, up to a fifth of it. Finer ones take more time and memory, so that
+// there is an end to it.
+constexpr double kFewVoxels = 24;  // across the smoke, in the mean of three directions
+constexpr double kThickVoxel = 8, kDeepVoxel = 4;  // optical depths
+constexpr double kThickShare = 0.2;                // of the smoke's cells
+constexpr double kClumps = 0.4;                    // excess density
+constexpr double kFinestVoxel = 0.5;               // of a density voxel
+constexpr std::uint64_t kMostFineBytes = 256 << 20;
+
+double lightVoxelEdge(const FrameSetup& setup) {
+  return setup.layout.lightVoxel * setup.medium->voxelEdge();
+}
+
+// Whether much of the smoke is deeper than `depth` in each light voxel.
+bool isDeep(const FrameSetup& setup, double depth) {
+  const auto extinction = static_cast<float>(depth / lightVoxelEdge(setup));
+  return setup.medium->majorants().shareAbove(extinction) > kThickShare;
+}
+
+// How much denser smoke is than within a light voxel around it, in the mean over the smoke: 0 where
+// it is even, 0.1 in shipped simulations, 0.6 in a cloud of balls of two light voxels. Light that
+// scatters in a clump is brighter there than in the gap beside it, which one voxel cannot tell
+// apart.
+double excessDensity(const transport::Medium& medium, double edge) {
+  constexpr std::uint64_t kPlaces = 4096;
+  const volume::MajorantGrid& cells = medium.majorants();
+  const auto forEachFilled = [&cells](const auto& visit) {
+    const Vec3i n = cells.dims();
+    for (int z = 0; z < n.z; ++z)
+      for (int y = 0; y < n.y; ++y)
+        for (int x = 0; x < n.x; ++x)
+          if (cells.majorant({x, y, z}) > 0) visit(Vec3i(x, y, z));
+  };
+  std::uint64_t filled = 0, cell = 0, place = 0;
+  forEachFilled([&](const Vec3i&) { ++filled; });
+  Rng rng(RandomKey::fromSeed(0, 0), RandomStream::visibility, 0);
+  const auto apart = static_cast<float>(edge / 2);
+  double excess = 0, all = 0;
+  const auto look = [&](const Vec3f& p) {
+    const float here = medium.extinction(p);
+    if (!(here > 0)) return;
+    float around = here;
+    for (int corner = 0; corner < 8; ++corner)
+      around += medium.extinction(
+          p + apart * Vec3f(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1));
+    excess += static_cast<double>(here * (here * 9 / around - 1));
+    all += static_cast<double>(here);
+  };
+  forEachFilled([&](const Vec3i& at) {
+    for (; place < kPlaces && place * filled / kPlaces == cell; ++place)
+      look(Vec3f(medium.bounds().min) +
+           (Vec3f(at) + Vec3f(rng.uniform(), rng.uniform(), rng.uniform())) * cells.cellSize());
+    ++cell;
+  });
+  return all > 0 ? excess / all : 0;
+}
+
+}  // namespace
+
+void chooseSmoothing(const ParamValues& e, FrameSetup& setup) {
+  using namespace estimators;
+  LightFieldLayout& l = setup.layout;
+  if (e.text("type") != "photosphere" || e.given("smoothing") || !e.text("cache").empty() ||
+      l.holdsPower() || setup.medium->bounds().empty() || !isDeep(setup, kThickVoxel))
+    return;
+  l.smoothing = Smoothing::visible;
+  setup.notes.push_back(
+      fmt::format("the smoke is many mean free paths deep in each light voxel: photons count by "
+                  "what {} of them (estimator.smoothing = \"visible\")",
+                  l.basis == Basis::view ? "the camera sees" : "is seen from all round"));
+}
+
+void chooseLightVoxel(const ParamValues& e, FrameSetup& setup) {
+  using namespace estimators;
+  LightFieldLayout& l = setup.layout;
+  const transport::Medium& medium = *setup.medium;
+  if (e.text("type") != "photosphere" || e.given("light_voxel") || !e.text("cache").empty() ||
+      l.carrier != Carrier::voxels || medium.bounds().empty())
+    return;
+  const Vec3d size = medium.bounds().extent();
+  const double across = std::cbrt(size.x * size.y * size.z) / medium.voxelEdge();
+  const double usual = l.lightVoxel;
+  const double radius = e.real("radius") * setup.space.metersPerUnit;
+  std::string_view why;
+  while (l.lightVoxel > kFinestVoxel) {
+    const bool few = across < kFewVoxels * l.lightVoxel;
+    const bool deep = l.smoothing != Smoothing::visible && isDeep(setup, kDeepVoxel);
+    if (!few && !deep && !(excessDensity(medium, lightVoxelEdge(setup)) > kClumps)) break;
+    const double before = std::exchange(l.lightVoxel, 0.5 * l.lightVoxel);
+    const double widest = kMostVoxelsWide * l.lightVoxel * medium.voxelEdge();
+    if (radius > widest || predictedLightBytes(setup) > kMostFineBytes) {
+      l.lightVoxel = before;
+      break;
+    }
+    why = few    ? "few voxels across"
+          : deep ? "several mean free paths deep in each voxel"
+                 : "in clumps of about a light voxel";
+  }
+  if (l.lightVoxel < usual)
+    setup.notes.push_back(
+        fmt::format("the smoke is {}: light is stored in voxels of {} density voxel "
+                    "(estimator.light_voxel)",
+                    why, l.lightVoxel));
+}
+
+}  // namespace photosphere::scene
