@@ -18,18 +18,13 @@ namespace {
 
 std::terminate_handler g_otherwise = nullptr;
 
-void print(const char* text) {
-  const ssize_t ignored = write(STDERR_FILENO, text, std::strlen(text));
-  static_cast<void>(ignored);
-}
-
 // Takes no memory: there may be none.
 [[noreturn]] void onTerminate() {
   removeTemporaries();
   if (const Resource lacking = exhausted(); lacking != Resource::none) {
-    print("photosphere: error: ");
-    print(remedyFor(lacking));
-    print("\n");
+    printRaw("photosphere: error: ");
+    printRaw(remedyFor(lacking));
+    printRaw("\n");
     _exit(static_cast<int>(ExitCode::memory));
   }
   // An exception is no heap that a file has damaged, which a handler of SIGABRT may stand for.
@@ -65,6 +60,11 @@ const char* remedyFor(Resource resource) noexcept {
            "(ulimit -u) and of memory (ulimit -v)";
   return "memory ran out; free some or raise its limit (ulimit -v), or use fewer pixels, photons, "
          "particles or voxels";
+}
+
+void printRaw(const char* text) noexcept {
+  const ssize_t ignored = write(STDERR_FILENO, text, std::strlen(text));
+  static_cast<void>(ignored);
 }
 
 void installTerminateHandler() noexcept {

@@ -54,11 +54,6 @@ void restoreHandlers() {
     }
 }
 
-void print(const char* text) {
-  const ssize_t ignored = write(STDERR_FILENO, text, std::strlen(text));
-  static_cast<void>(ignored);
-}
-
 // What follows is async-signal-safe: system calls and removeTemporaries only.
 
 // Returns where no file is being read.
@@ -68,11 +63,13 @@ void endIfReading() {
   for (const Slot& slot : slots) {
     if (!slot.armed.load(std::memory_order_relaxed)) continue;
     reading = true;
-    print("photosphere: ");
-    print(slot.file);
-    print(usedUp ? ": memory ran out while reading it; raise its limit (ulimit -v)\n"
-                 : ": the OpenVDB library crashed while reading it: the file is damaged; write or "
-                   "copy it again\n");
+    printRaw("photosphere: ");
+    printRaw(slot.file);
+    printRaw(": ");
+    printRaw(usedUp ? kRanOutReading
+                    : "the OpenVDB library crashed while reading it: the file is damaged; write or "
+                      "copy it again");
+    printRaw("\n");
   }
   if (!reading) return;
   removeTemporaries();
@@ -91,9 +88,9 @@ extern "C" void photosphereOnCrash(int number, siginfo_t* info, void*) {
     return;
   }
   endIfReading();
-  print("photosphere: ");
-  print(lastRead);
-  print(
+  printRaw("photosphere: ");
+  printRaw(lastRead);
+  printRaw(
       ": the memory was found damaged after this file, or one before it, was read. The OpenVDB "
       "library does that with a damaged file: write or copy it again\n");
   removeTemporaries();

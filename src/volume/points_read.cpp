@@ -12,6 +12,7 @@
 #include "crash_guard.h"
 #include "openvdb_grid.h"
 #include "photosphere/core/error.h"
+#include "photosphere/core/exhaustion.h"
 #include "photosphere/core/log.h"
 #include "photosphere/core/parallel.h"
 #include "photosphere/core/resources.h"
@@ -216,8 +217,7 @@ ParticleSet gridToPoints(const Grid& grid) {
     throw InputError(describe(grid), std::string("is damaged: ") + error.what());
   } catch (const std::bad_alloc&) {
     if (freeAddresses() < std::numeric_limits<std::uint64_t>::max())
-      throw MemoryError(describe(grid) +
-                        ": memory ran out while reading it; raise its limit (ulimit -v)");
+      throw MemoryError(describe(grid) + ": " + kRanOutReading);
     throw InputError(describe(grid), "claims more points than there is memory for");
   } catch (const std::length_error&) {
     throw InputError(describe(grid), "claims more points than there is memory for");

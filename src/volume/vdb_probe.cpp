@@ -139,8 +139,7 @@ bool probeVdb(const std::filesystem::path& path, std::string& reason) {
   // What the child may take is bounded by this process's own limit.
   if (WIFEXITED(status) && WEXITSTATUS(status) == static_cast<int>(ExitCode::memory) &&
       freeAddresses() < limits.memory)
-    throw MemoryError(path.string() +
-                      ": memory ran out while reading it; raise its limit (ulimit -v)");
+    throw MemoryError(path.string() + ": " + kRanOutReading);
   if (WIFSIGNALED(status)) reason = signalReason(path, WTERMSIG(status), limits);
   if (reason.empty()) reason = path.string() + ": cannot be read";
   return false;

@@ -10,6 +10,7 @@
 #include "crash_guard.h"
 #include "openvdb_grid.h"
 #include "photosphere/core/error.h"
+#include "photosphere/core/exhaustion.h"
 #include "photosphere/core/resources.h"
 #include "photosphere/volume/vdb_file.h"
 #include "vdb_walk.h"
@@ -102,10 +103,7 @@ VdbFile readVdb(const std::filesystem::path& path) {
     throw;
   } catch (const std::bad_alloc&) {
     if (freeAddresses() < mostFor(contents.fileSize))
-      throw MemoryError(
-          fmt::format("{}: memory ran out while reading it ({} are left of its "
-                      "limit); raise that (ulimit -v)",
-                      result.path, formatBytes(freeAddresses())));
+      throw MemoryError(result.path + ": " + kRanOutReading);
     throw InputError(
         result.path,
         fmt::format("asks for more memory than there is, or than its bytes can stand for ({} free, "

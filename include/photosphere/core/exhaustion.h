@@ -14,6 +14,13 @@ Resource exhausted() noexcept;
 /// @param resource  not `none`
 const char* remedyFor(Resource resource) noexcept;
 
+/// What to say, after its name, of a file over whose reading memory ran out.
+inline constexpr char kRanOutReading[] =
+    "memory ran out while reading it; raise its limit (ulimit -v)";
+
+/// To standard error, for handlers of signals and where there is no memory.
+void printRaw(const char* text) noexcept;
+
 /// From then on an exception that nothing can catch (a library starts threads where it may not
 /// throw) removes temporaries, and where it says that memory or threads ran out, the process says
 /// so and ends with exit code 5. Others are printed and abort, as they do without. May be called
