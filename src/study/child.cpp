@@ -67,11 +67,13 @@ std::string readAll(int in, pid_t child) {
   }
 }
 
+constexpr std::string_view kDeath = "its process ";
+
 std::string endOf(int status) {
   if (WIFSIGNALED(status))
-    return fmt::format("its process was ended by signal {} ({})", WTERMSIG(status),
+    return fmt::format("{}was ended by signal {} ({})", kDeath, WTERMSIG(status),
                        strsignal(WTERMSIG(status)));
-  return fmt::format("its process ended with {} and no answer", WEXITSTATUS(status));
+  return fmt::format("{}ended with {} and no answer", kDeath, WEXITSTATUS(status));
 }
 
 ChildResult parse(const std::string& text, int status) {
@@ -145,6 +147,10 @@ std::string factsWork(const scene::SceneFile& scene, std::int64_t frame) {
 }
 
 }  // namespace
+
+bool tellsOfDeath(std::string_view message) {
+  return message.starts_with(kDeath);
+}
 
 ChildResult runInChild(const std::function<std::string()>& work, double cpuSeconds) {
   throwIfInterrupted();

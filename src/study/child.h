@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "photosphere/core/error.h"
@@ -27,6 +28,10 @@ struct ChildResult {
 /// @param cpuSeconds  processor time after which the child is ended, as a failure; 0 = no limit
 /// @throws InterruptedError once the child has ended after a signal; Error when no child can start
 ChildResult runInChild(const std::function<std::string()>& work, double cpuSeconds = 0);
+
+/// Whether the message of a failure tells of a process that died, and not of an error that it had
+/// to report.
+bool tellsOfDeath(std::string_view message);
 
 /// One frame to render in a child.
 struct RenderJob {

@@ -207,6 +207,32 @@ class Table {
                              m_catalogue.folder, sets);
   }
 
+  bool onlyRuns() const { return m_options.work < 1; }
+
+  void doLess(scene::SceneFile& scene) const {
+    const auto less = [&](ParamValues& values, const char* key) {
+      values.set(key,
+                 std::max(std::int64_t{1},
+                          static_cast<std::int64_t>(std::llround(
+                              static_cast<double>(values.integer(key)) * m_options.work))),
+                 "less work");
+    };
+    for (const char* key : {"photons", "samples", "final_gather"})
+      less(scene.estimator, key);
+    less(scene.render, "samples");
+  }
+
+  // A row of which nothing but its end is known.
+  static void tellEnd(const StabilityFrame& frame, StabilityRow& row) {
+    row.expected = "an end";
+    row.result = frame.failed ? fmt::format("exit {}", static_cast<int>(frame.code))
+                              : numberText(meanOf(frame));
+    row.message = frame.message;
+    row.passed = !(frame.failed && frame.code == ExitCode::unspecified) && row.nanSamples == 0 &&
+                 row.negativeSamples == 0;
+    judgeMajorants(frame.majorantViolations, row);
+  }
+
   StabilityFrameJob jobOf(const StabilityCase& c, const SmokeSpec& smoke, const Sets& sets,
                           int lamps) {
     StabilityFrameJob job;
@@ -217,6 +243,10 @@ class Table {
       job.request.crop = render::Crop{{c.crop[0], c.crop[1]}, {c.crop[2], c.crop[3]}};
     job.layer = c.layer;
     job.cpuLimit = m_options.quick ? kQuickCpuLimit : kCpuLimit;
+    if (onlyRuns()) {
+      doLess(job.scene);
+      job.cpuLimit = kCpuLimit * kFiner;
+    }
     return job;
   }
 
@@ -288,7 +318,10 @@ class Table {
       row.nanSamples = frame.nanSamples;
       row.negativeSamples = frame.negativeSamples;
       row.cappedPower = frame.cappedShare;
-      judge(c, e, frame, row);
+      if (onlyRuns())
+        tellEnd(frame, row);
+      else
+        judge(c, e, frame, row);
     } catch (const InterruptedError&) {
       throw;
     } catch (const ConfigError& error) {
@@ -297,7 +330,10 @@ class Table {
       refused.failed = true;
       refused.code = error.code();
       refused.message = error.what();
-      judge(c, e, refused, row);
+      if (onlyRuns())
+        tellEnd(refused, row);
+      else
+        judge(c, e, refused, row);
     }
     finish(std::move(row));
   }
@@ -392,7 +428,16 @@ class Table {
   void runTrace(const StabilityCase& c) {
     if (!m_options.estimators.empty()) return;
     StabilityRow row = rowOf(c, "-");
-    runStabilityTrace(c, m_options.quick, row);
+    StabilityCase part = c;
+    if (onlyRuns())
+      for (const char* key : {"photons", "quick_photons"})
+        if (c.slab.numbers.contains(key))
+          part.slab.numbers[key] = {
+              std::max(1.0, std::round(c.slab.number(key, 0) * m_options.work))};
+    runStabilityTrace(part, m_options.quick, row);
+    // What came to an end of its own has a result.
+    if (onlyRuns())
+      row.passed = !row.result.empty() && !tellsOfDeath(row.message) && row.nanSamples == 0;
     finish(std::move(row));
   }
 
@@ -425,8 +470,12 @@ class Table {
         row.nanSamples += frame.nanSamples;
         row.negativeSamples += frame.negativeSamples;
         violations += frame.majorantViolations;
-        more = !frame.failed && effort < SlabRadiance::kDim.size() &&
+        more = !onlyRuns() && !frame.failed && effort < SlabRadiance::kDim.size() &&
                meanOf(frame) < SlabRadiance::kDim[effort];
+      }
+      if (onlyRuns()) {
+        tellEnd(frame, row);
+        return finish(std::move(row));
       }
       if (frame.failed) {
         fail(row, frame.message);

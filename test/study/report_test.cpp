@@ -121,6 +121,8 @@ TEST(Child, returnsItsTextOrItsFailure) {
   EXPECT_EQ(refused.code, ExitCode::usage);
   EXPECT_EQ(refused.message, "no such key");
   const ChildResult died = runInChild([]() -> std::string { _exit(3); });
+  EXPECT_TRUE(tellsOfDeath(died.message)) << died.message;
+  EXPECT_FALSE(tellsOfDeath(refused.message)) << refused.message;
   EXPECT_TRUE(died.failed);
   EXPECT_NE(died.message.find("3"), std::string::npos);
 }

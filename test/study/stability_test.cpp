@@ -48,6 +48,63 @@ std::string complaintAbout(const std::string& cases, const std::vector<std::stri
   return "";
 }
 
+TEST(Stability, WithLessWorkOnlyTheEndIsJudged) {
+  const TemporaryFolder folder;
+  const std::string head =
+      "[[case]]\nhard = \"-\"\nestimators = [\"single\"]\nbound = 0\n"
+      "oracle = { kind = \"value\", value = 1e9 }\n";
+  writeCatalogue(folder, head + "name = \"a\"\n" + head +
+                             "name = \"refused\"\nset = ['volume.0.grid=\"none\"']\n");
+  StabilityOptions options;
+  options.catalogue = folder.path();
+  for (const double work : {1.0, 0.5}) {
+    options.work = work;
+    const std::vector<StabilityRow> rows = runStability(options, {});
+    ASSERT_EQ(rows.size(), 2u);
+    EXPECT_EQ(rows[0].passed, work < 1) << rows[0].message;
+    EXPECT_EQ(rows[1].passed, work < 1) << rows[1].message;
+    EXPECT_EQ(rows[1].result, work < 1 ? "exit 2" : "") << rows[1].message;
+  }
+}
+
+/// Sanitizers watch every case of a file, with little work each; without them study.hard_cases runs
+/// and judges them.
+class EveryCase : public ::testing::TestWithParam<std::string> {};
+
+TEST_P(EveryCase, ComesToAnEnd) {
+  const TemporaryFolder folder;
+  writeCatalogue(folder, test::readText(projectFile("data/hard/cases/" + GetParam())));
+  StabilityOptions options;
+  options.catalogue = folder.path();
+  options.quick = true;
+  options.work = 0.02;
+  std::size_t refused = 0;
+  const std::vector<StabilityRow> rows = runStability(options, [&](const StabilityRow& row) {
+    refused += row.result.starts_with("exit");
+    EXPECT_TRUE(row.passed) << row.name << ' ' << row.estimator << ": " << row.result << ' '
+                            << row.message;
+  });
+  EXPECT_GT(rows.size(), 5u);
+  EXPECT_LT(refused, rows.size() * 3 / 4);
+}
+
+std::vector<std::string> caseFiles() {
+  std::vector<std::string> names;
+  if (!test::kSanitized) return names;
+  for (const auto& entry : std::filesystem::directory_iterator(projectFile("data/hard/cases")))
+    names.push_back(entry.path().filename().string());
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(EveryCase);
+INSTANTIATE_TEST_SUITE_P(Hard, EveryCase, ::testing::ValuesIn(caseFiles()), [](const auto& name) {
+  std::string word = std::filesystem::path(name.param).stem().string();
+  std::replace_if(
+      word.begin(), word.end(), [](unsigned char c) { return !std::isalnum(c); }, '_');
+  return word;
+});
+
 TEST(Stability, ErrorsOfBlocks) {
   const StabilityFrame one = frameOf(16, 8, 1);
   StabilityFrame other = frameOf(16, 8, 1.1);

@@ -13,7 +13,11 @@ namespace photosphere::study {
 struct StabilityOptions {
   /// Folder of the catalogue; empty = data/hard beside the tool, or in the source tree.
   std::filesystem::path catalogue;
-  bool quick = false;                   ///< small size, as continuous integration runs it
+  bool quick = false;  ///< small size, as continuous integration runs it
+  /// Part of each case's photons, samples and paths. Below 1 nothing is held against an answer: a
+  /// row passes where its process comes to an end of its own, without NaN or negative samples. For
+  /// builds that are slow and watch every access.
+  double work = 1;
   std::vector<std::string> cases;       ///< names, or beginnings of names; empty = all
   std::vector<std::string> estimators;  ///< only these; empty = all
 };
