@@ -7,7 +7,9 @@
 #include <cstring>
 #include <exception>
 #include <new>
+#include <string_view>
 #include <system_error>
+#include <utility>
 
 #include "photosphere/core/error.h"
 #include "photosphere/core/output_file.h"
@@ -46,9 +48,12 @@ Resource exhausted() noexcept {
     if (error.code() == std::errc::resource_unavailable_try_again) return Resource::threads;
     if (error.code() == std::errc::not_enough_memory) return Resource::memory;
   } catch (const std::exception& error) {
-    // TBB and OpenColorIO say it in words alone.
-    if (std::strstr(error.what(), "pthread_create has failed")) return Resource::threads;
-    if (std::strstr(error.what(), "bad_alloc")) return Resource::memory;
+    // TBB says it in words alone, and others hand on the words of std::bad_alloc. Further on in a
+    // message the same words may be those of a file.
+    constexpr std::string_view noThread = "pthread_create has failed";
+    const std::string_view words = error.what();
+    if (words.starts_with(noThread)) return Resource::threads;
+    if (words == "std::bad_alloc") return Resource::memory;
   } catch (...) {
   }
   return Resource::none;
@@ -68,8 +73,10 @@ void printRaw(const char* text) noexcept {
 }
 
 void installTerminateHandler() noexcept {
-  const std::terminate_handler before = std::set_terminate(onTerminate);
-  if (before != onTerminate) g_otherwise = before;
+  // Once: a handler set later may end with this one, which must not begin anew with that.
+  static bool installed = false;
+  if (std::exchange(installed, true)) return;
+  g_otherwise = std::set_terminate(onTerminate);
 }
 
 }  // namespace photosphere

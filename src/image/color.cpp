@@ -155,7 +155,11 @@ ColorConfig ColorConfig::load(const std::string& optionPath) {
     impl->source = path;
     return ColorConfig(std::move(impl));
   } catch (const std::exception& failure) {
-    if (exhausted() != Resource::none) throw;  // nothing is wrong with the config
+    // Nothing is wrong with the config.
+    if (exhausted() != Resource::none) throw;
+    if (failure.what() ==
+        fmt::format("Error: Loading the OCIO profile '{}' failed. std::bad_alloc", path))
+      throw std::bad_alloc();
     throw InputError(
         path, fmt::format("is not a colour config that OpenColorIO {} can use: {}; correct it, "
                           "or leave it out for the shipped config",

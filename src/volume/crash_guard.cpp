@@ -9,6 +9,7 @@
 #include <cstring>
 #include <exception>
 #include <mutex>
+#include <utility>
 
 #include "photosphere/core/error.h"
 #include "photosphere/core/exhaustion.h"
@@ -127,8 +128,9 @@ CrashGuard::CrashGuard(const std::filesystem::path& file)
     m_stack.clear();  // this thread has one: a guard further out, or a sanitizer's
   }
   if (armedCount++ > 0) return;
-  if (const auto before = std::set_terminate(onTerminate); before != onTerminate)
-    otherwise = before;
+  // Once: a handler set later may end with this one, which must not begin anew with that.
+  static bool watching = false;
+  if (!std::exchange(watching, true)) otherwise = std::set_terminate(onTerminate);
   struct sigaction action {};
   action.sa_sigaction = photosphereOnCrash;
   action.sa_flags = SA_ONSTACK | SA_SIGINFO;

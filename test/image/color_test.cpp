@@ -87,11 +87,14 @@ TEST(ColorConfig, missingBrokenAndBuiltInConfigsAreNamed) {
   EXPECT_NE(first.find("$OCIO"), std::string::npos) << first;
 
   const std::string broken = (folder / "broken.ocio").string();
-  for (const char* text : {"", "ocio_profile_version: 2\nroles: [",
-                           "\x7f"
-                           "ELF",
-                           "ocio_profile_version: 99\n",
-                           "ocio_profile_version: 2\nroles: {scene_linear: nowhere}\n"}) {
+  for (const char* text :
+       {"", "ocio_profile_version: 2\nroles: [",
+        "\x7f"
+        "ELF",
+        "ocio_profile_version: 99\n", "ocio_profile_version: 2\nroles: {scene_linear: nowhere}\n",
+        // What it says is not what has befallen its reader.
+        "ocio_profile_version: 2\nroles: {'bad_alloc: failed. std::bad_alloc\n",
+        "ocio_profile_version: std::bad_alloc\n"}) {
     test::writeText(broken, text);
     const std::string said = message<InputError>([&] { ColorConfig::load(broken); });
     EXPECT_NE(said.find(broken), std::string::npos) << said;
