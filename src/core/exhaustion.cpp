@@ -50,9 +50,8 @@ Resource exhausted() noexcept {
   } catch (const std::exception& error) {
     // TBB says it in words alone, and others hand on the words of std::bad_alloc. Further on in a
     // message the same words may be those of a file.
-    constexpr std::string_view noThread = "pthread_create has failed";
     const std::string_view words = error.what();
-    if (words.starts_with(noThread)) return Resource::threads;
+    if (words.starts_with("pthread_create has failed")) return Resource::threads;
     if (words == "std::bad_alloc") return Resource::memory;
   } catch (...) {
   }

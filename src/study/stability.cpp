@@ -318,10 +318,7 @@ class Table {
       row.nanSamples = frame.nanSamples;
       row.negativeSamples = frame.negativeSamples;
       row.cappedPower = frame.cappedShare;
-      if (onlyRuns())
-        tellEnd(frame, row);
-      else
-        judge(c, e, frame, row);
+      judge(c, e, frame, row);
     } catch (const InterruptedError&) {
       throw;
     } catch (const ConfigError& error) {
@@ -330,16 +327,14 @@ class Table {
       refused.failed = true;
       refused.code = error.code();
       refused.message = error.what();
-      if (onlyRuns())
-        tellEnd(refused, row);
-      else
-        judge(c, e, refused, row);
+      judge(c, e, refused, row);
     }
     finish(std::move(row));
   }
 
   void judge(const StabilityCase& c, const StabilityEstimator& e, const StabilityFrame& frame,
              StabilityRow& row) {
+    if (onlyRuns()) return tellEnd(frame, row);
     if (c.oracle.kind == "error")
       return judgeRefusal(c, frame.failed, frame.code, frame.message, row);
     if (frame.failed) {

@@ -5,6 +5,7 @@
 
 #include <filesystem>
 
+#include "photosphere/core/error.h"
 #include "trial.h"
 
 namespace photosphere::fuzz {
@@ -26,6 +27,20 @@ TEST(Regressions, NoneComesBack) {
     ++inputs;
   }
   EXPECT_GT(inputs, 0);
+}
+
+// Too long to be kept as a file.
+TEST(Regressions, StatisticsWithinStatisticsAreRefused) {
+  const test::TemporaryFolder folder;
+  const std::string deep(300'000, '[');
+  try {
+    findTarget("stats")->read(
+        "[{\"frame\": 1, \"a\": " + deep + std::string(deep.size(), ']') + "}]", folder.path());
+    ADD_FAILURE() << "read";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("values within values"), std::string::npos)
+        << error.what();
+  }
 }
 
 }  // namespace
