@@ -3,6 +3,8 @@
 # Declares one module from every .cpp of the calling folder (searched recursively): an object library
 # whose objects become part of the library `photosphere`. USES is the row of the module table: the
 # modules that this one may include. It is recorded for the layer test, which reads the includes.
+# With PHOTOSPHERE_UNITY six sources are compiled as one, as most of the time goes into headers that they
+# share: names differ from file to file, also those that no other file sees.
 define_property(GLOBAL PROPERTY PHOTOSPHERE_MODULES BRIEF_DOCS "Module names, lowest first")
 define_property(GLOBAL PROPERTY PHOTOSPHERE_MODULE_TABLE BRIEF_DOCS "module: used modules")
 define_property(GLOBAL PROPERTY PHOTOSPHERE_LOADED BRIEF_DOCS "Libraries loaded when needed")
@@ -21,6 +23,8 @@ function(photosphere_module)
   target_include_directories(${target}
     PUBLIC "$<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include>"
     PRIVATE "${CMAKE_CURRENT_SOURCE_DIR}")
+  set_target_properties(${target} PROPERTIES
+    UNITY_BUILD ${PHOTOSPHERE_UNITY} UNITY_BUILD_BATCH_SIZE 6)
   target_link_libraries(${target} PRIVATE photosphere_settings)
   target_link_libraries(${target} PUBLIC glm::glm fmt::fmt ${arg_LIBRARIES})
   if(PHOTOSPHERE_TIDY)
@@ -48,20 +52,25 @@ function(photosphere_loaded)
   set_property(GLOBAL APPEND PROPERTY PHOTOSPHERE_LOADED ${target})
 endfunction()
 
-# photosphere_plugins(MODULE module TYPE type FUNCTION function HEADER header PLUGINS stem...)
+# photosphere_plugins(MODULE module TYPE type FUNCTION function HEADER header [ALONE] PLUGINS stem...)
 #
 # Generates the constant table of a plug-in folder. Each stem is a source `<stem>.cpp` that defines
 # `const <type> photosphere::<module>::plugins::<stem>`; the table is what `<function>()` returns,
 # a std::span<const <type>* const>. A self-registering static would be dropped by the linker from a
-# static library; this table cannot be.
+# static library; this table cannot be. ALONE: the sources share names, and each is compiled by itself.
 function(photosphere_plugins)
-  cmake_parse_arguments(PARSE_ARGV 0 arg "" "MODULE;TYPE;FUNCTION;HEADER" "PLUGINS")
+  cmake_parse_arguments(PARSE_ARGV 0 arg "ALONE" "MODULE;TYPE;FUNCTION;HEADER" "PLUGINS")
   set(declarations "")
   set(entries "")
   foreach(stem IN LISTS arg_PLUGINS)
     string(APPEND declarations "extern const ${arg_TYPE} ${stem};\n")
     string(APPEND entries "    &plugins::${stem},\n")
   endforeach()
+  if(arg_ALONE)
+    list(TRANSFORM arg_PLUGINS REPLACE "(.+)" "${CMAKE_CURRENT_SOURCE_DIR}/*\\1.cpp" OUTPUT_VARIABLE patterns)
+    file(GLOB_RECURSE sources ${patterns})
+    set_source_files_properties(${sources} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+  endif()
   set(PLUGIN_MODULE "${arg_MODULE}")
   set(PLUGIN_TYPE "${arg_TYPE}")
   set(PLUGIN_FUNCTION "${arg_FUNCTION}")

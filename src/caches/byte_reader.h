@@ -16,6 +16,7 @@
 namespace photosphere::caches {
 
 enum class ByteOrder { little, big };
+inline constexpr ByteOrder kLittle = ByteOrder::little;
 
 /// A number stored at `bytes` in the given order.
 template <class T>

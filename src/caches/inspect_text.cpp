@@ -9,16 +9,17 @@ namespace photosphere::caches {
 namespace {
 
 template <class V>
-std::string triple(const V& v) {
+std::string tripleText(const V& v) {
   return fmt::format("{:.6g} {:.6g} {:.6g}", v.x, v.y, v.z);
 }
-std::string triple(const Vec3i& v) {
+std::string tripleText(const Vec3i& v) {
   return fmt::format("{} {} {}", v.x, v.y, v.z);
 }
 
 template <class B>
 std::string boxText(const B& box) {
-  return box.empty() ? "empty" : fmt::format("({}) to ({})", triple(box.min), triple(box.max));
+  return box.empty() ? "empty"
+                     : fmt::format("({}) to ({})", tripleText(box.min), tripleText(box.max));
 }
 
 void appendGrid(std::string& text, const GridReport& grid) {
@@ -27,8 +28,8 @@ void appendGrid(std::string& text, const GridReport& grid) {
                       formatBytes(grid.memoryBytes));
   text += fmt::format("    index box   {}\n", boxText(grid.indexBounds));
   text += fmt::format("    world box   {}\n", boxText(grid.worldBounds));
-  text +=
-      fmt::format("    voxel size  {} ({} transform)\n", triple(grid.voxelSize), grid.transform);
+  text += fmt::format("    voxel size  {} ({} transform)\n", tripleText(grid.voxelSize),
+                      grid.transform);
   if (grid.hasValues)
     text += fmt::format(
         "    {}      min {:.6g}  max {:.6g}  mean {:.6g}  ({} NaN, {} infinite, {} "

@@ -15,7 +15,6 @@ namespace {
 
 constexpr std::size_t kMaxStride = std::size_t(1) << 20;
 constexpr std::int32_t kMaxChannels = 1024;
-constexpr auto kLittle = ByteOrder::little;
 constexpr Scalar kTypes[] = {Scalar::i16, Scalar::i32, Scalar::i64, Scalar::f16,
                              Scalar::f32, Scalar::f64, Scalar::u16, Scalar::u32,
                              Scalar::u64, Scalar::i8,  Scalar::u8};

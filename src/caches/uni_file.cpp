@@ -9,7 +9,6 @@ namespace photosphere::caches {
 
 namespace {
 
-constexpr auto kLittle = ByteOrder::little;
 constexpr std::size_t kGridInfo = 252, kParticleInfo = 256;
 enum ElementType { kInteger = 0, kReal = 1, kVector = 2 };
 

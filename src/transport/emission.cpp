@@ -7,8 +7,8 @@ namespace photosphere::transport {
 
 namespace {
 
-using Field = volume::BrickField<Vec4f>;
-constexpr int kNodes = Field::kNodes;
+using EmissionField = volume::BrickField<Vec4f>;
+constexpr int kNodes = EmissionField::kNodes;
 
 // Integral over a brick of a node's interpolation weight, per axis: nodes on its faces share
 // theirs with the neighbour.
@@ -61,7 +61,7 @@ Emission::Emission(const std::vector<const VolumeEmission*>& volumes, double rea
           m_power += watts * Vec3d(sum);
           m_birthPower += watts * sum.w;
           m_sources.push_back({static_cast<std::uint32_t>(m_placed.size() - 1), brick,
-                               Vec3i(x, y, z) * Field::kEdge, m_birthPower});
+                               Vec3i(x, y, z) * EmissionField::kEdge, m_birthPower});
         }
   }
   m_region.box = volume::widened(m_region.box, reach);
@@ -122,7 +122,7 @@ void Emission::hash(Hasher& hasher) const {
   for (const Source& s : m_sources) {
     hasher.number(s.volume);
     hasher.numbers(&s.lowest.x, 3);
-    hasher.numbers(&m_placed[s.volume].field->nodes(s.brick)->x, 4 * Field::kBrickSize);
+    hasher.numbers(&m_placed[s.volume].field->nodes(s.brick)->x, 4 * EmissionField::kBrickSize);
   }
 }
 

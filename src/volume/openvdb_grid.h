@@ -2,11 +2,10 @@
 // OpenVDB inside the module: one place that initialises it, translates its types and dispatches on
 // a grid's value type.
 
-#include <openvdb/openvdb.h>
-
 #include <string>
 #include <type_traits>
 
+#include "openvdb_instances.h"
 #include "photosphere/volume/grid.h"
 
 namespace photosphere::volume {

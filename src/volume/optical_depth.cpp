@@ -1,10 +1,10 @@
 #include "photosphere/volume/optical_depth.h"
 
-#include <openvdb/openvdb.h>
-
 #include <algorithm>
 #include <cmath>
 #include <vector>
+
+#include "openvdb_instances.h"
 
 namespace photosphere::volume {
 

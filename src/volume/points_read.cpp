@@ -24,10 +24,10 @@ namespace photosphere::volume {
 namespace {
 
 namespace pts = openvdb::points;
-using Leaf = pts::PointDataTree::LeafNodeType;
+using PointLeaf = pts::PointDataTree::LeafNodeType;
 
-struct LeafRange {
-  const Leaf* leaf;
+struct ReadLeaf {
+  const PointLeaf* leaf;
   std::size_t begin;  ///< its first particle's place in the set
 };
 
@@ -63,7 +63,7 @@ class PointReader {
 
  private:
   // The offsets come from the file: they must rise and end where the attribute arrays end.
-  std::size_t countPoints(const Leaf& leaf) const {
+  std::size_t countPoints(const PointLeaf& leaf) const {
     try {
       leaf.validateOffsets();
     } catch (const openvdb::Exception& error) {
@@ -77,7 +77,7 @@ class PointReader {
     return leaf.pointCount();
   }
 
-  const pts::AttributeArray& array(const Leaf& leaf, const std::string& name,
+  const pts::AttributeArray& array(const PointLeaf& leaf, const std::string& name,
                                    const openvdb::Name& type, openvdb::Index stride) const {
     const pts::AttributeArray* found =
         leaf.hasAttribute(name) ? &leaf.constAttributeArray(name) : nullptr;
@@ -112,10 +112,10 @@ class PointReader {
     take(sizeof(Vec3d));
     result.positions.resize(m_size);
     const openvdb::math::Transform& transform = m_grid->transform();
-    forEachLeaf([&](const Leaf& leaf, std::size_t begin) {
+    forEachLeaf([&](const PointLeaf& leaf, std::size_t begin) {
       const pts::AttributeHandle<openvdb::Vec3f> handle(array(leaf, "P", "vec3s", 1));
       openvdb::Index next = 0;
-      for (openvdb::Index voxel = 0; voxel < Leaf::SIZE; ++voxel) {
+      for (openvdb::Index voxel = 0; voxel < PointLeaf::SIZE; ++voxel) {
         const openvdb::Vec3d center = leaf.offsetToGlobalCoord(voxel).asVec3d();
         const openvdb::Index end = leaf.getValue(voxel);
         for (; next < end; ++next)
@@ -133,7 +133,7 @@ class PointReader {
     const std::size_t arity = static_cast<std::size_t>(stride) * Components;
     take(arity * sizeof(Element));
     std::vector<Element> column(arity * m_size);
-    forEachLeaf([&](const Leaf& leaf, std::size_t begin) {
+    forEachLeaf([&](const PointLeaf& leaf, std::size_t begin) {
       const pts::AttributeHandle<Value> handle(array(leaf, name, type, stride));
       Element* target = column.data() + arity * begin;
       const auto count = static_cast<openvdb::Index>(leaf.pointCount());
@@ -157,7 +157,7 @@ class PointReader {
     const openvdb::Index stride = first.stride();
     take(stride * sizeof(std::string));
     std::vector<std::string> column(stride * m_size);
-    forEachLeaf([&](const Leaf& leaf, std::size_t begin) {
+    forEachLeaf([&](const PointLeaf& leaf, std::size_t begin) {
       const pts::StringAttributeHandle handle(array(leaf, name, first.valueType(), stride),
                                               leaf.attributeSet().descriptor().getMetadata());
       const auto count = static_cast<openvdb::Index>(leaf.pointCount());
@@ -200,7 +200,7 @@ class PointReader {
 
   std::string m_name;
   std::shared_ptr<const pts::PointDataGrid> m_grid;
-  std::vector<LeafRange> m_leaves;
+  std::vector<ReadLeaf> m_leaves;
   std::size_t m_size = 0;
   std::uint64_t m_room = 0;  ///< memory that is not spoken for [bytes]
 };

@@ -22,23 +22,23 @@ namespace {
 namespace pts = openvdb::points;
 using PointGrid = pts::PointDataGrid;
 using PointTree = pts::PointDataTree;
-using Leaf = PointTree::LeafNodeType;
+using PointLeaf = PointTree::LeafNodeType;
 using Positions = pts::TypedAttributeArray<openvdb::Vec3f, pts::NullCodec>;
 
 // A leaf and the binned particles that it holds.
-struct LeafRange {
-  Leaf* leaf;
+struct WrittenLeaf {
+  PointLeaf* leaf;
   std::size_t begin, end;
 };
 
-Leaf* makeLeaf(const std::vector<PointBin>& bins, std::size_t begin, std::size_t end,
-               const pts::AttributeSet::Descriptor::Ptr& descriptor) {
+PointLeaf* makeLeaf(const std::vector<PointBin>& bins, std::size_t begin, std::size_t end,
+                    const pts::AttributeSet::Descriptor::Ptr& descriptor) {
   const Vec3i block = bins[begin].block;
-  auto* leaf = new Leaf(openvdb::Coord(block.x * 8, block.y * 8, block.z * 8), 0u, false);
+  auto* leaf = new PointLeaf(openvdb::Coord(block.x * 8, block.y * 8, block.z * 8), 0u, false);
   leaf->initializeAttributes(descriptor, static_cast<openvdb::Index>(end - begin));
-  std::vector<Leaf::ValueType> offsets(Leaf::SIZE);
+  std::vector<PointLeaf::ValueType> offsets(PointLeaf::SIZE);
   std::size_t next = begin;
-  for (openvdb::Index voxel = 0; voxel < Leaf::SIZE; ++voxel) {
+  for (openvdb::Index voxel = 0; voxel < PointLeaf::SIZE; ++voxel) {
     while (next < end && bins[next].voxel == voxel)
       ++next;
     offsets[voxel] = static_cast<openvdb::PointDataIndex32>(next - begin);
@@ -47,14 +47,14 @@ Leaf* makeLeaf(const std::vector<PointBin>& bins, std::size_t begin, std::size_t
   return leaf;
 }
 
-std::vector<LeafRange> makeLeaves(PointTree& tree, const std::vector<PointBin>& bins) {
+std::vector<WrittenLeaf> makeLeaves(PointTree& tree, const std::vector<PointBin>& bins) {
   const auto descriptor = pts::AttributeSet::Descriptor::create(Positions::attributeType());
-  std::vector<LeafRange> leaves;
+  std::vector<WrittenLeaf> leaves;
   for (std::size_t begin = 0; begin < bins.size();) {
     std::size_t end = begin + 1;
     while (end < bins.size() && bins[end].block == bins[begin].block)
       ++end;
-    Leaf* leaf = makeLeaf(bins, begin, end, descriptor);
+    PointLeaf* leaf = makeLeaf(bins, begin, end, descriptor);
     tree.addLeaf(leaf);
     leaves.push_back({leaf, begin, end});
     begin = end;
@@ -64,16 +64,17 @@ std::vector<LeafRange> makeLeaves(PointTree& tree, const std::vector<PointBin>& 
 
 // Calls fill(array, range) for the attribute `name` of every leaf.
 template <class Fill>
-void forEachLeaf(const std::vector<LeafRange>& leaves, const std::string& name, const Fill& fill) {
+void forEachLeaf(const std::vector<WrittenLeaf>& leaves, const std::string& name,
+                 const Fill& fill) {
   parallelFor(leaves.size(), 16, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i)
       fill(leaves[i].leaf->attributeArray(name), leaves[i]);
   });
 }
 
-void writePositions(const std::vector<LeafRange>& leaves, const std::vector<PointBin>& bins,
+void writePositions(const std::vector<WrittenLeaf>& leaves, const std::vector<PointBin>& bins,
                     const ParticleSet& particles, const openvdb::math::Transform& transform) {
-  forEachLeaf(leaves, "P", [&](pts::AttributeArray& array, const LeafRange& range) {
+  forEachLeaf(leaves, "P", [&](pts::AttributeArray& array, const WrittenLeaf& range) {
     pts::AttributeWriteHandle<openvdb::Vec3f, pts::NullCodec> handle(array);
     for (std::size_t i = range.begin; i < range.end; ++i) {
       const openvdb::Vec3d index =
@@ -86,14 +87,14 @@ void writePositions(const std::vector<LeafRange>& leaves, const std::vector<Poin
 
 // `Value` is what OpenVDB stores, one of them per `Stride` slots of the attribute.
 template <class Value, class Element>
-void writeValues(PointTree& tree, const std::vector<LeafRange>& leaves,
+void writeValues(PointTree& tree, const std::vector<WrittenLeaf>& leaves,
                  const std::vector<PointBin>& bins, const Attribute& attribute,
                  const std::string& name, const std::vector<Element>& column) {
   constexpr bool isVector = !std::is_same_v<Value, Element>;
   const std::size_t arity = static_cast<std::size_t>(attribute.arity);
   const auto stride = static_cast<openvdb::Index>(isVector ? 1 : arity);
   pts::appendAttribute<Value>(tree, name, openvdb::zeroVal<Value>(), stride);
-  forEachLeaf(leaves, name, [&](pts::AttributeArray& array, const LeafRange& range) {
+  forEachLeaf(leaves, name, [&](pts::AttributeArray& array, const WrittenLeaf& range) {
     pts::AttributeWriteHandle<Value, pts::NullCodec> handle(array);
     for (std::size_t i = range.begin; i < range.end; ++i) {
       const Element* source = column.data() + arity * bins[i].particle;
@@ -107,7 +108,7 @@ void writeValues(PointTree& tree, const std::vector<LeafRange>& leaves,
   });
 }
 
-void writeStrings(PointTree& tree, const std::vector<LeafRange>& leaves,
+void writeStrings(PointTree& tree, const std::vector<WrittenLeaf>& leaves,
                   const std::vector<PointBin>& bins, const Attribute& attribute,
                   const std::string& name, const std::vector<std::string>& column) {
   const std::size_t arity = static_cast<std::size_t>(attribute.arity);
@@ -122,7 +123,7 @@ void writeStrings(PointTree& tree, const std::vector<LeafRange>& leaves,
       const std::string& text = column[arity * bin.particle + c];
       if (!text.empty()) inserter.insert(text);
     }
-  forEachLeaf(leaves, name, [&](pts::AttributeArray& array, const LeafRange& range) {
+  forEachLeaf(leaves, name, [&](pts::AttributeArray& array, const WrittenLeaf& range) {
     pts::StringAttributeWriteHandle handle(array, strings);
     for (std::size_t i = range.begin; i < range.end; ++i)
       for (std::size_t c = 0; c < arity; ++c)
@@ -146,7 +147,7 @@ struct VectorOf<std::int32_t> {
   using Type = openvdb::Vec3i;
 };
 
-void writeAttribute(PointTree& tree, const std::vector<LeafRange>& leaves,
+void writeAttribute(PointTree& tree, const std::vector<WrittenLeaf>& leaves,
                     const std::vector<PointBin>& bins, const Attribute& attribute,
                     const std::string& name) {
   std::visit(
@@ -201,7 +202,7 @@ Grid pointsToGrid(const ParticleSet& particles, std::string_view name, double vo
                  particles.size() - bins.size(), name);
 
   auto tree = std::make_shared<PointTree>();
-  const std::vector<LeafRange> leaves = makeLeaves(*tree, bins);
+  const std::vector<WrittenLeaf> leaves = makeLeaves(*tree, bins);
   writePositions(leaves, bins, particles, *transform);
   for (const Attribute& attribute : particles.attributes)
     writeAttribute(*tree, leaves, bins, attribute, storedName(attribute.name));

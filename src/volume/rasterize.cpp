@@ -21,7 +21,7 @@ namespace photosphere::volume {
 
 namespace {
 
-using Leaf = openvdb::FloatTree::LeafNodeType;
+using DensityLeaf = openvdb::FloatTree::LeafNodeType;
 
 // A splat in a cubic tile of voxels that it touches. Sorted by tile, then by splat: the order of a
 // tile's sums is that of the particles, whatever thread forms them.
@@ -31,7 +31,7 @@ struct Visit {
 };
 
 struct TileResult {
-  std::vector<std::unique_ptr<Leaf>> leaves;
+  std::vector<std::unique_ptr<DensityLeaf>> leaves;
   double sum = 0;  ///< of the voxels as stored
 };
 
@@ -62,7 +62,7 @@ class Rasterizer {
     double sum = 0;
     for (TileResult& tile : tiles) {
       sum += tile.sum;
-      for (std::unique_ptr<Leaf>& leaf : tile.leaves)
+      for (std::unique_ptr<DensityLeaf>& leaf : tile.leaves)
         tree.addLeaf(leaf.release());
     }
     return sum;
@@ -170,18 +170,19 @@ class Rasterizer {
       for (int y = 0; y < m_edge; y += 8)
         for (int z = 0; z < m_edge; z += 8)
           makeLeaf(corner + Vec3i(x, y, z), buffer, result);
-    spend(static_cast<double>(result.leaves.size()) * (sizeof(Leaf) + 512 * sizeof(float)));
+    spend(static_cast<double>(result.leaves.size()) * (sizeof(DensityLeaf) + 512 * sizeof(float)));
   }
 
   void makeLeaf(const Vec3i& corner, const std::vector<double>& buffer, TileResult& result) {
-    std::unique_ptr<Leaf> leaf;
-    for (openvdb::Index i = 0; i < Leaf::SIZE; ++i) {
+    std::unique_ptr<DensityLeaf> leaf;
+    for (openvdb::Index i = 0; i < DensityLeaf::SIZE; ++i) {
       const Vec3i local(i >> 6, (i >> 3) & 7, i & 7);
       const double mass = buffer[place(corner.x + local.x, corner.y + local.y, corner.z + local.z)];
       const auto density = static_cast<float>(mass * m_inverseVolume);
       if (!(density > 0)) continue;
       if (!leaf)
-        leaf = std::make_unique<Leaf>(openvdb::Coord(corner.x, corner.y, corner.z), 0.0f, false);
+        leaf = std::make_unique<DensityLeaf>(openvdb::Coord(corner.x, corner.y, corner.z), 0.0f,
+                                             false);
       leaf->setValueOn(i, density);
       result.sum += static_cast<double>(density);
     }

@@ -3,9 +3,9 @@
 #include "photosphere/volume/bricks.h"
 
 #include <gtest/gtest.h>
-#include <openvdb/openvdb.h>
 #include <openvdb/tools/Interpolation.h>
 
+#include "openvdb_instances.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/rng.h"
 #include "photosphere/volume/majorant_grid.h"

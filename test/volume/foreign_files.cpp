@@ -1,9 +1,9 @@
 // Files written by other software, with the counts that their writers recorded in them.
 #include <gtest/gtest.h>
-#include <openvdb/openvdb.h>
 
 #include <cmath>
 
+#include "openvdb_instances.h"
 #include "photosphere/core/error.h"
 #include "photosphere/volume/vdb_file.h"
 #include "support/support.h"

@@ -1,9 +1,8 @@
 // What no coefficient can be is found, named and, where asked, zeroed.
 
-#include <openvdb/openvdb.h>
-
 #include <limits>
 
+#include "openvdb_instances.h"
 #include "photosphere/core/error.h"
 #include "photosphere/volume/grid_variants.h"
 #include "photosphere/volume/invalid_values.h"

@@ -2,7 +2,6 @@
 #include "photosphere/volume/rasterize.h"
 
 #include <gtest/gtest.h>
-#include <openvdb/openvdb.h>
 
 #include <algorithm>
 #include <array>
@@ -10,6 +9,7 @@
 #include <limits>
 #include <map>
 
+#include "openvdb_instances.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/parallel.h"
 #include "photosphere/core/rng.h"

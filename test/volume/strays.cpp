@@ -2,12 +2,12 @@
 #include "photosphere/volume/strays.h"
 
 #include <gtest/gtest.h>
-#include <openvdb/openvdb.h>
 
 #include <cmath>
 #include <limits>
 #include <optional>
 
+#include "openvdb_instances.h"
 #include "photosphere/core/rng.h"
 #include "photosphere/volume/rasterize.h"
 #include "photosphere/volume/vdb_file.h"

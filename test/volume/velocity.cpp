@@ -1,8 +1,8 @@
 // Velocities made ready for lookups, from grids and from particles.
 
 #include <gtest/gtest.h>
-#include <openvdb/openvdb.h>
 
+#include "openvdb_instances.h"
 #include "photosphere/core/error.h"
 #include "photosphere/volume/bricks.h"
 #include "photosphere/volume/vdb_file.h"

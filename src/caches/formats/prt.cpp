@@ -18,8 +18,6 @@
 namespace photosphere::caches::plugins {
 namespace {
 
-constexpr auto kLittle = ByteOrder::little;
-
 bool recognize(std::string_view head) {
   return head.starts_with(kPrtMagic);
 }

@@ -21,7 +21,7 @@ namespace photosphere::cli::plugins {
 
 namespace {
 
-struct Options {
+struct CompareArguments {
   std::string image, reference, secondReference, errorMap;
   std::vector<std::string> layers;
   std::optional<double> tolerance;
@@ -72,7 +72,8 @@ void printText(const image::ImageComparison& comparison) {
     printLine("channels of the reference alone: {}", fmt::join(comparison.onlyInReference, ", "));
 }
 
-void printJson(const image::ImageComparison& comparison, const Options& options, bool within) {
+void printJson(const image::ImageComparison& comparison, const CompareArguments& options,
+               bool within) {
   nlohmann::ordered_json layers = nlohmann::ordered_json::object();
   for (const image::LayerComparison& layer : comparison.layers) {
     layers[layer.layer] = {{"all", toJson(layer.all)}};
@@ -130,7 +131,7 @@ void writeErrorMap(const std::string& path, const image::Image& test, const imag
   image::writeExr(path, map);
 }
 
-bool withinTolerance(const image::ImageComparison& comparison, const Options& options) {
+bool withinTolerance(const image::ImageComparison& comparison, const CompareArguments& options) {
   bool within = true;
   for (const image::LayerComparison& layer : comparison.layers) {
     const image::ErrorMetrics& m = layer.all;
@@ -144,7 +145,7 @@ bool withinTolerance(const image::ImageComparison& comparison, const Options& op
   return within;
 }
 
-int runCompare(const Options& options) {
+int runCompare(const CompareArguments& options) {
   JobFiles files;
   files.reads("IMAGE", options.image);
   files.reads("REFERENCE", options.reference);
@@ -166,7 +167,7 @@ int runCompare(const Options& options) {
 }
 
 std::function<int()> declareCompare(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CompareArguments>();
   app.add_option("IMAGE", options->image, "Image to judge")->type_name("A.exr")->required();
   app.add_option("REFERENCE", options->reference, "Image that is right")
       ->type_name("B.exr")

@@ -22,7 +22,7 @@ namespace photosphere::cli::plugins {
 
 namespace {
 
-struct Options {
+struct ConvertArguments {
   std::vector<std::string> inputs;
   std::string output, origin = "0,0,0";
   std::vector<std::string> formatOptions;
@@ -43,7 +43,7 @@ std::string formatHelp() {
 
 /// Frames to convert: asked for, or found for the first numbered input.
 /// @throws InputMissingError when the pattern has no file
-std::vector<std::int64_t> chooseFrames(const Options& options) {
+std::vector<std::int64_t> chooseFrames(const ConvertArguments& options) {
   const auto numbered = std::find_if(options.inputs.begin(), options.inputs.end(),
                                      [](const std::string& path) { return hasFrameToken(path); });
   if (!options.frames.frames.empty()) {
@@ -72,7 +72,7 @@ bool isComplete(const std::string& path) {
   return false;
 }
 
-void runFrame(const Options& options, std::int64_t frame) {
+void runFrame(const ConvertArguments& options, std::int64_t frame) {
   std::vector<std::string> inputs;
   for (const std::string& path : options.inputs)
     inputs.push_back(framePath(path, frame));
@@ -90,7 +90,7 @@ void runFrame(const Options& options, std::int64_t frame) {
   convertFrame(inputs, output, options.convert);
 }
 
-int runConvert(Options& options) {
+int runConvert(ConvertArguments& options) {
   options.convert.placement.origin = parseVec3("--origin", options.origin);
   for (const std::string& text : options.formatOptions)
     options.convert.formatOptions.push_back(parseAssignment("--format-option", text));
@@ -106,7 +106,7 @@ int runConvert(Options& options) {
 }
 
 std::function<int()> declareConvert(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ConvertArguments>();
   ConvertOptions& convert = options->convert;
   app.add_option("IN", options->inputs,
                  "Files of one frame, or patterns such as smoke.####.vdb; several are put together")

@@ -15,7 +15,7 @@ namespace photosphere::cli::plugins {
 
 namespace {
 
-struct Options {
+struct InspectArguments {
   std::vector<std::string> files;
   bool json = false;
 };
@@ -40,7 +40,7 @@ bool inspectOne(const std::string& path, bool json, std::vector<std::string>& ob
   return true;
 }
 
-int runInspect(const Options& options) {
+int runInspect(const InspectArguments& options) {
   std::vector<std::string> objects;
   bool sound = true;
   for (const std::string& path : options.files) {
@@ -57,7 +57,7 @@ int runInspect(const Options& options) {
 }
 
 std::function<int()> declareInspect(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<InspectArguments>();
   app.add_option("FILE", options->files, "Cache files, or patterns such as smoke.####.vdb")
       ->type_name("")
       ->required();

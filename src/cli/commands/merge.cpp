@@ -21,21 +21,21 @@ namespace photosphere::cli::plugins {
 
 namespace {
 
-struct Options {
+struct MergeArguments {
   std::vector<std::string> shards;
   std::string output, stats;
   FrameOptions frames;
 };
 
 /// --frames, else the frames that the first numbered shard has, else 1.
-std::vector<std::int64_t> frameList(const Options& options) {
+std::vector<std::int64_t> frameList(const MergeArguments& options) {
   if (!options.frames.frames.empty()) return parseFrames(options.frames.frames);
   for (const std::string& shard : options.shards)
     if (hasFrameToken(shard)) return framesByFiles(shard);
   return {1};
 }
 
-void mergeOne(const Options& options, std::int64_t frame, StatsFile& stats) {
+void mergeOne(const MergeArguments& options, std::int64_t frame, StatsFile& stats) {
   const std::string path = framePath(options.output, frame);
   std::vector<std::filesystem::path> shards;
   for (const std::string& shard : options.shards)
@@ -52,7 +52,7 @@ void mergeOne(const Options& options, std::int64_t frame, StatsFile& stats) {
   stats.add(frame, path, s);
 }
 
-int runMerge(const Options& options) {
+int runMerge(const MergeArguments& options) {
   if (std::filesystem::path(options.output).extension() != ".vdb")
     throw ConfigError(options.output + ": a light cache is written as .vdb");
   const std::vector<std::int64_t> frames = frameList(options);
@@ -72,7 +72,7 @@ int runMerge(const Options& options) {
 }
 
 std::function<int()> declareMerge(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<MergeArguments>();
   app.add_option("SHARD", options->shards,
                  "Every shard of `photosphere trace --shard i/n`, in any order, with #### for "
                  "frames")

@@ -18,7 +18,7 @@ namespace photosphere::cli::plugins {
 
 namespace {
 
-struct Options {
+struct PlanArguments {
   SceneOptions scene;
   bool json = false;
 };
@@ -42,7 +42,7 @@ void printText(const scene::FramePlan& plan) {
     log::info("frame {}: {}", plan.frame, note);
 }
 
-int runPlan(const Options& options) {
+int runPlan(const PlanArguments& options) {
   const scene::SceneFile scene = openScene(options.scene);
   if (options.scene.dumpScene) {
     printLine("{}", scene::dumpScene(scene));
@@ -74,7 +74,7 @@ int runPlan(const Options& options) {
 }
 
 std::function<int()> declarePlan(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<PlanArguments>();
   app.add_flag("--json", options->json, "One JSON object a frame, or an array of them");
   addPlanOptions(app, options->scene);
   app.footer(

@@ -24,7 +24,7 @@ namespace photosphere::cli::plugins {
 
 namespace {
 
-struct Options {
+struct RenderArguments {
   SceneOptions scene;
   std::optional<double> targetError, timeLimit;
   std::string output, crop, compression = "zip";
@@ -51,7 +51,7 @@ std::optional<render::Crop> parseCrop(const std::string& text) {
 }
 
 // @return false where target_error was missed
-bool renderOne(const scene::SceneFile& scene, std::int64_t frame, Options& options,
+bool renderOne(const scene::SceneFile& scene, std::int64_t frame, RenderArguments& options,
                const scene::RenderRequest& request, const scene::FrameWriter& writer,
                StatsFile& stats) {
   checkWritable(framePath(options.write.path, frame));
@@ -75,7 +75,7 @@ bool renderOne(const scene::SceneFile& scene, std::int64_t frame, Options& optio
 
 /// @throws ConfigError where a frame would be written over what the job reads, or over another file
 void checkOverwriting(const scene::SceneFile& scene, const scene::FrameWriter& writer,
-                      const Options& options, const std::vector<std::int64_t>& frames,
+                      const RenderArguments& options, const std::vector<std::int64_t>& frames,
                       const CacheFrames& cacheFrames) {
   JobFiles files = filesRead(scene, frames, cacheFrames);
   files.reads("the OCIO config", writer.colorConfig());
@@ -85,7 +85,7 @@ void checkOverwriting(const scene::SceneFile& scene, const scene::FrameWriter& w
 }
 
 int renderFrames(const scene::SceneFile& scene, const scene::FrameWriter& writer,
-                 Options& options) {
+                 RenderArguments& options) {
   const std::vector<std::int64_t> frames = sceneFrameList(scene, options.scene);
   checkOutputPattern(options.write.path, frames.size());
   if (!options.write.preview.empty()) checkOutputPattern(options.write.preview, frames.size());
@@ -127,7 +127,7 @@ int renderFrames(const scene::SceneFile& scene, const scene::FrameWriter& writer
   return static_cast<int>(ExitCode::accuracy);
 }
 
-int runRender(Options& options) {
+int runRender(RenderArguments& options) {
   parseCrop(options.crop);
   options.write.compression = image::parseExrCompression(options.compression);
   // After -s: the option that is more explicit wins.
@@ -153,7 +153,7 @@ std::string sceneHelp() {
 }
 
 std::function<int()> declareRender(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<RenderArguments>();
   app.add_option("-o,--output", options->output, "EXR to write, with #### for several frames")
       ->type_name("OUT.exr");
   addSceneOptions(app, options->scene);

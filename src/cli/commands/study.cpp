@@ -24,7 +24,7 @@ namespace photosphere::cli::plugins {
 
 namespace {
 
-struct Options {
+struct StudyArguments {
   study::StudyOptions study;
   std::string scene, output, cache, resolution, frames;
   bool noHardCases = false, noFlicker = false, paper = false, hard = false;
@@ -32,7 +32,7 @@ struct Options {
 };
 
 // What to work on is said once.
-void checkSubject(const Options& options) {
+void checkSubject(const StudyArguments& options) {
   const bool own = options.paper || options.hard;
   if (options.paper && options.hard) throw ConfigError("give --paper or --hard, not both");
   if (own != options.scene.empty())
@@ -44,7 +44,7 @@ void checkSubject(const Options& options) {
   if (!options.hard && options.output.empty()) throw ConfigError("-o DIR is required");
 }
 
-void complete(Options& options) {
+void complete(StudyArguments& options) {
   checkSubject(options);
   study::StudyOptions& s = options.study;
   s.scene = options.scene;
@@ -99,7 +99,7 @@ int reportSweeps(const study::StudyOptions& s) {
 }
 
 // The table goes to standard output, with -o as CSV too. Any row outside its bound is exit 7.
-int reportHardCases(const Options& options) {
+int reportHardCases(const StudyArguments& options) {
   for (const bool unused : {!options.study.sets.empty(), !options.resolution.empty(),
                             !options.frames.empty(), options.study.minutes > 0})
     if (unused)
@@ -123,7 +123,7 @@ int reportHardCases(const Options& options) {
   return static_cast<int>(failed > 0 ? ExitCode::accuracy : ExitCode::ok);
 }
 
-int runStudy(Options& options) {
+int runStudy(StudyArguments& options) {
   complete(options);
   if (options.hard) return reportHardCases(options);
   try {
@@ -135,7 +135,7 @@ int runStudy(Options& options) {
   }
 }
 
-void declareSettings(CLI::App& app, Options& options) {
+void declareSettings(CLI::App& app, StudyArguments& options) {
   study::StudyOptions& s = options.study;
   app.add_option("-s,--set", s.sets, "Override a key of the scene; repeatable")
       ->type_name("KEY=VALUE")
@@ -168,7 +168,7 @@ void declareSettings(CLI::App& app, Options& options) {
 }
 
 std::function<int()> declareStudy(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<StudyArguments>();
   app.add_option("SCENE", options->scene, "Scene (.toml), or a cache for which one is made up")
       ->type_name("FILE");
   app.add_flag("--paper", options->paper,

@@ -21,7 +21,7 @@ namespace photosphere::cli::plugins {
 
 namespace {
 
-struct Options {
+struct TraceArguments {
   SceneOptions scene;
   std::string output, shardText;
   std::optional<estimators::ShardNumber> shard;
@@ -37,7 +37,7 @@ std::optional<estimators::ShardNumber> parseShard(const std::string& text) {
                                  static_cast<std::uint64_t>(n[1])};
 }
 
-void traceOne(const scene::SceneFile& scene, std::int64_t frame, const Options& options,
+void traceOne(const scene::SceneFile& scene, std::int64_t frame, const TraceArguments& options,
               const scene::RenderRequest& request, StatsFile& stats) {
   const std::string path = framePath(options.output, frame);
   checkWritable(path);
@@ -49,7 +49,7 @@ void traceOne(const scene::SceneFile& scene, std::int64_t frame, const Options& 
   stats.add(frame, path, s);
 }
 
-int traceFrames(const scene::SceneFile& scene, const Options& options) {
+int traceFrames(const scene::SceneFile& scene, const TraceArguments& options) {
   const std::vector<std::int64_t> frames = sceneFrameList(scene, options.scene);
   checkOutputPattern(options.output, frames.size());
   const CacheFrames cacheFrames(scene, options.scene);
@@ -87,7 +87,7 @@ int traceFrames(const scene::SceneFile& scene, const Options& options) {
   });
 }
 
-int runTrace(Options& options) {
+int runTrace(TraceArguments& options) {
   const scene::SceneFile scene = openScene(options.scene);
   if (options.scene.dumpScene) {
     printLine("{}", scene::dumpScene(scene));
@@ -101,7 +101,7 @@ int runTrace(Options& options) {
 }
 
 std::function<int()> declareTrace(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<TraceArguments>();
   app.add_option("-o,--output", options->output, "Light cache to write, with #### for frames")
       ->type_name("LIGHT.vdb");
   addSceneOptions(app, options->scene);
