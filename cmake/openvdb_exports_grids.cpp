@@ -12,9 +12,7 @@ openvdb::Index64 use() {
 
 int main() {
   using namespace openvdb;
-  return use<BoolGrid>() + use<FloatGrid>() + use<DoubleGrid>() + use<Int32Grid>() +
-                     use<Int64Grid>() + use<Vec3IGrid>() + use<Vec3SGrid>() + use<Vec3DGrid>() ==
-                 0
-             ? 1
-             : 0;
+  const Index64 bytes = use<BoolGrid>() + use<FloatGrid>() + use<DoubleGrid>() + use<Int32Grid>() +
+                        use<Int64Grid>() + use<Vec3IGrid>() + use<Vec3SGrid>() + use<Vec3DGrid>();
+  return bytes > 0 ? 0 : 1;
 }

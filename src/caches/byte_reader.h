@@ -16,6 +16,7 @@
 namespace photosphere::caches {
 
 enum class ByteOrder { little, big };
+/// That of .prt and .uni, on any machine.
 inline constexpr ByteOrder kLittle = ByteOrder::little;
 
 /// A number stored at `bytes` in the given order.
