@@ -48,6 +48,10 @@ volume::Grid someSmoke() {
   return volume::denseToGrid("density", Vec3i(3), values, Mat4d(1));
 }
 
+void addBytes(std::vector<Specimen>& all, std::string target, std::string name, std::string bytes) {
+  all.push_back({std::move(target), std::move(name), [bytes = std::move(bytes)] { return bytes; }});
+}
+
 /// Contents to offer a writer: it takes the first that its format can hold.
 std::vector<CacheContent> contents() {
   CacheContent particles;
@@ -61,17 +65,22 @@ std::vector<CacheContent> contents() {
 std::string written(const caches::CacheFormat& format, const std::string& file,
                     const char* encoding = nullptr) {
   const TemporaryFolder folder;
+  const log::Level level = log::level();
+  log::setLevel(log::Level::off);  // of what a format cannot hold
   ParamValues options(format.params);
   if (encoding) options.set("encoding", std::string(encoding), "specimen");
+  std::string bytes;
   for (const CacheContent& content : contents()) {
     try {
       format.write(folder / file, content, options);
-      return test::readText(folder / file);
+      bytes = test::readText(folder / file);
+      break;
     } catch (const ConfigError&) {
       // Not what this format holds.
     }
   }
-  return {};
+  log::setLevel(level);
+  return bytes;
 }
 
 void addWritten(std::vector<Specimen>& all) {
@@ -80,11 +89,13 @@ void addWritten(std::vector<Specimen>& all) {
     for (const std::string_view extension : format->extensions) {
       std::string file = "a";
       file += extension;
-      all.push_back({targetOf(*format, extension), file.substr(2), written(*format, file)});
+      all.push_back({targetOf(*format, extension), file.substr(2),
+                     [format, file] { return written(*format, file); }});
     }
     if (format->name == "ply")
       for (const char* encoding : {"ascii", "binary_big_endian"})
-        all.push_back({"ply", encoding, written(*format, "a.ply", encoding)});
+        all.push_back(
+            {"ply", encoding, [format, encoding] { return written(*format, "a.ply", encoding); }});
   }
 }
 
@@ -127,19 +138,19 @@ std::string unpackedPrt() {
 }
 
 void addHandMade(std::vector<Specimen>& all) {
-  all.push_back({"ply", "lists",
-                 "ply\nformat ascii 1.0\nelement f 1\nproperty list uchar int i\nelement vertex 2\n"
-                 "property float x\nproperty float y\nproperty float z\nproperty list int uchar l\n"
-                 "end_header\n2 1 2\n0 0 0 1 1\n1 1 1 0\n"});
-  all.push_back({"pts", "colours", "2\n0 0 0 5 255 0 0\n1 1 1 5 0 255 0\n"});
+  addBytes(all, "ply", "lists",
+           "ply\nformat ascii 1.0\nelement f 1\nproperty list uchar int i\nelement vertex 2\n"
+           "property float x\nproperty float y\nproperty float z\nproperty list int uchar l\n"
+           "end_header\n2 1 2\n0 0 0 1 1\n1 1 1 0\n");
+  addBytes(all, "pts", "colours", "2\n0 0 0 5 255 0 0\n1 1 1 5 0 255 0\n");
   const std::string grids[] = {uniGrid(3, 1, 1), uniGrid(2, 12, 2), uniParticles(5)};
   const char* const names[] = {"numbers", "staggered", "particles"};
   for (int i = 0; i < 3; ++i) {
-    all.push_back({"uni", names[i], gzip(grids[i], 9)});
-    all.push_back({"uni.unpacked", names[i], grids[i]});
+    addBytes(all, "uni", names[i], gzip(grids[i], 9));
+    addBytes(all, "uni.unpacked", names[i], grids[i]);
   }
-  all.push_back({"prt.unpacked", "positions", unpackedPrt()});
-  all.push_back({"detect", "ply", "ply\nformat ascii 1.0\n"});
+  addBytes(all, "prt.unpacked", "positions", unpackedPrt());
+  addBytes(all, "detect", "ply", "ply\nformat ascii 1.0\n");
 }
 
 /// Of three voxels, with weights, or of three particles: what fields and sums of light share.
@@ -187,25 +198,40 @@ std::string lightShard(estimators::Carrier carrier) {
   return test::readText(folder / "a.vdb");
 }
 
-void addVolumes(std::vector<Specimen>& all) {
-  const TemporaryFolder folder;
+std::string smokeAndPoints() {
   volume::ParticleSet points;
   points.positions = {Vec3d(0.1), Vec3d(0.2, 0.3, 0.9), Vec3d(1.5)};
   points.add({"v", 3, std::vector<float>{1, 2, 3, 4, 5, 6, 7, 8, 9}});
   points.add({"label", 1, std::vector<std::string>{"a", "b", "a"}});
+  const TemporaryFolder folder;
   volume::writeVdb(folder / "a.vdb", {someSmoke(), volume::pointsToGrid(points, "points", 1)},
                    {{"note", "made to be damaged"}});
+  return test::readText(folder / "a.vdb");
+}
+
+std::string twoSmokes() {
+  const TemporaryFolder folder;
+  volume::writeVdb(folder / "a.vdb", {someSmoke(), volume::renamed(someSmoke(), "again")});
+  return test::readText(folder / "a.vdb");
+}
+
+/// Says that it lacks the offsets of its grids.
+std::string withoutOffsets() {
+  std::string bytes = twoSmokes();
+  bytes[20] = 0;
+  return bytes;
+}
+
+void addVolumes(std::vector<Specimen>& all) {
   for (const char* target : {"vdb", "vdb.walk"})
-    all.push_back({target, "smoke_and_points", test::readText(folder / "a.vdb")});
-  volume::writeVdb(folder / "b.vdb", {someSmoke(), volume::renamed(someSmoke(), "again")});
-  all.push_back({"vdb", "smoke", test::readText(folder / "b.vdb")});
-  std::string streamed = test::readText(folder / "b.vdb");
-  streamed[20] = 0;  // says that the file lacks the offsets of its grids
-  all.push_back({"vdb.walk", "without_offsets", streamed});
-  for (const auto& [name, carrier] : {std::pair("voxels", estimators::Carrier::voxels),
-                                      std::pair("particles", estimators::Carrier::particles)}) {
-    all.push_back({"light_cache", name, lightCache(carrier)});
-    all.push_back({"light_shard", name, lightShard(carrier)});
+    all.push_back({target, "smoke_and_points", smokeAndPoints});
+  all.push_back({"vdb", "smoke", twoSmokes});
+  all.push_back({"vdb.walk", "without_offsets", withoutOffsets});
+  using estimators::Carrier;
+  for (const auto carrier : {Carrier::voxels, Carrier::particles}) {
+    const char* name = carrier == Carrier::voxels ? "voxels" : "particles";
+    all.push_back({"light_cache", name, [carrier] { return lightCache(carrier); }});
+    all.push_back({"light_shard", name, [carrier] { return lightShard(carrier); }});
   }
 }
 
@@ -297,20 +323,20 @@ void addPictures(std::vector<Specimen>& all) {
   const std::pair<const char*, ExrCompression> compressions[] = {
       {"zip", ExrCompression::zip}, {"piz", ExrCompression::piz}, {"dwaa", ExrCompression::dwaa}};
   for (const auto& [name, compression] : compressions)
-    all.push_back({"exr", name, exr(compression)});
-  all.push_back({"exr.scan", "rle", exr(ExrCompression::rle)});
+    all.push_back({"exr", name, [c = compression] { return exr(c); }});
+  all.push_back({"exr.scan", "rle", [] { return exr(ExrCompression::rle); }});
   for (const char* target : {"exr", "exr.scan"})
-    all.push_back({target, "tiled", tiledExr()});
-  all.push_back({"hdr", "runs", radiance()});
+    all.push_back({target, "tiled", tiledExr});
+  all.push_back({"hdr", "runs", radiance});
   const auto addPicture = [&](const char* format, const char* compression) {
     const std::string name = std::string(format) + (*compression ? "_" : "") + compression;
-    all.push_back({"picture", name, {}, [=] { return picture(format, compression); }});
+    all.push_back({"picture", name, [=] { return picture(format, compression); }});
   };
   for (const char* format : {"png", "jpeg", "bmp", "targa"})
     addPicture(format, "");
   for (const char* compression : {"zip", "lzw"})
     addPicture("tiff", compression);
-  all.push_back({"ocio", "curve", kColorConfig});
+  addBytes(all, "ocio", "curve", kColorConfig);
 }
 
 /// A part of a checkpoint, of the work named `work`.
@@ -327,7 +353,7 @@ std::string checkpointPart() {
 }
 
 void addTexts(std::vector<Specimen>& all) {
-  all.push_back({"scene", "keyed", R"([scene]
+  addBytes(all, "scene", "keyed", R"([scene]
 fps = "24000/1001"
 frames = "1-5x2"
 [camera]
@@ -343,35 +369,33 @@ type = "spot"
 intensity = 1e1
 [output]
 aovs = ["beauty", 'single']
-)"});
+)");
   for (const auto& entry : std::filesystem::directory_iterator(test::projectFile("data/scenes")))
-    all.push_back({"scene", entry.path().stem().string(), test::readText(entry.path())});
-  all.push_back({"overrides", "several",
-                 "volume.0.density_scale=4\nlight.1.type=point\ncamera.look_at=[1, 2, 3]\n"
-                 "render.samples=2\nvolume.0.file=other.vdb\n"});
-  all.push_back({"frames", "range", "3,4,10-20x2,5-1,-10--5,1-5y2"});
-  all.push_back({"chan", "shot",
-                 "# frame, translation, rotation, field of view\n1 0 0 5 0 0 0 40\n"
-                 "2\t+0.5 -1e-1 5 10 20 -30 41.5\r\n\n3 1 0 5 0 0 0 42\n"});
-  all.push_back({"checkpoint", "part", checkpointPart()});
-  all.push_back({"stats", "two_frames",
-                 R"([{"frame": 1, "output": "a.0001.exr", "seconds": {"total": 1.5e0}},
+    all.push_back({"scene", entry.path().stem().string(),
+                   [path = entry.path()] { return test::readText(path); }});
+  addBytes(all, "overrides", "several",
+           "volume.0.density_scale=4\nlight.1.type=point\ncamera.look_at=[1, 2, 3]\n"
+           "render.samples=2\nvolume.0.file=other.vdb\n");
+  addBytes(all, "frames", "range", "3,4,10-20x2,5-1,-10--5,1-5y2");
+  addBytes(all, "chan", "shot",
+           "# frame, translation, rotation, field of view\n1 0 0 5 0 0 0 40\n"
+           "2\t+0.5 -1e-1 5 10 20 -30 41.5\r\n\n3 1 0 5 0 0 0 42\n");
+  all.push_back({"checkpoint", "part", checkpointPart});
+  addBytes(all, "stats", "two_frames",
+           R"([{"frame": 1, "output": "a.0001.exr", "seconds": {"total": 1.5e0}},
  {"frame": -2, "output": "\u00fc", "energy_watts": {"emitted": [1, 2, null]}, "why": ["a", true]}]
-)"});
+)");
 }
 
 }  // namespace
 
 std::vector<Specimen> specimens() {
-  const log::Level level = log::level();
-  log::setLevel(log::Level::off);  // of what a format cannot hold
   std::vector<Specimen> all;
   addWritten(all);
   addHandMade(all);
   addVolumes(all);
   addPictures(all);
   addTexts(all);
-  log::setLevel(level);
   return all;
 }
 

@@ -29,12 +29,10 @@ const std::vector<Target>& targets();
 /// nullptr when there is none of that name.
 const Target* findTarget(std::string_view name);
 
-/// A small sound input of a target.
+/// A small sound input of a target. Made when it is asked for: a writer waits for the disk.
 struct Specimen {
-  std::string target, name, bytes;
-  std::function<std::string()> make = {};  ///< in place of bytes that take long to make
-
-  std::string content() const { return make ? make() : bytes; }
+  std::string target, name;
+  std::function<std::string()> content;
 };
 
 /// The target that reads a format's files of this extension; extensions that a reader treats alike
