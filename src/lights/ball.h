@@ -53,13 +53,32 @@ class BallLight : public SurfaceLight {
     const double length = glm::length(d);
     const Vec3d axis = length > 0 ? d / length : Vec3d(0, 0, 1);
     const Vec3d normal = directionInCone(axis, 2 * static_cast<double>(u.x), u.y);
-    return {m_center + normal * m_radius, normal};
+    return {m_center + normal * m_radius, normal, area()};
   }
   // Points at the same angle to that axis have the same power.
   Vec2i nodes(const BoundingSphere&) const override { return {kSurfaceNodes, 1}; }
   double area() const override { return 4 * kPi * m_radius * m_radius; }
   const Vec3d& center() const override { return m_center; }
   double extent() const override { return m_radius; }
+  double halfWidth() const override { return m_radius; }
+  double nearest(const Vec3d& point) const override {
+    return std::max(0.0, glm::length(point - m_center) - m_radius);
+  }
+  Cone headings(const BoundingSphere& bounds) const override {
+    return coneToward(m_center, {bounds.center, bounds.radius + m_radius});
+  }
+  std::optional<double> departs(const Vec3d& origin, const Vec3d& direction) const override {
+    const Vec3d to = m_center - origin;
+    const double along = glm::dot(to, direction);
+    const Vec3d beside = to - direction * along;
+    const double squared = m_radius * m_radius - glm::dot(beside, beside);
+    if (!(squared > 0)) return {};
+    return along + std::sqrt(squared);
+  }
+
+  bool isBehind(const BoundingSphere& bounds) const override {
+    return glm::length(bounds.center - m_center) + bounds.radius <= m_radius;
+  }
 
   Vec3d m_center;
   double m_radius;  // [m]

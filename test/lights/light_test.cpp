@@ -317,7 +317,9 @@ TEST(AreaLights, IlluminateAsTheClosedFormsSay) {
     const auto disk = makeLight(
         "disk",
         {{"position", "[0, 0, 0]"}, {"target", "[0, 0, 1]"}, {"radius", "1"}, {"intensity", "2"}});
-    EXPECT_NEAR(mean(*disk, Vec3f(0, 0, d), {0, 0, -1}) / (2 * kPi * sine2), 1, 2e-4) << d;
+    // Its rim cuts the lattice of directions near by.
+    EXPECT_NEAR(mean(*disk, Vec3f(0, 0, d), {0, 0, -1}) / (2 * kPi * sine2), 1, d < 2 ? 1e-3 : 2e-4)
+        << d;
     EXPECT_EQ(mean(*disk, Vec3f(0, 0, -d), {0, 0, 1}), 0) << "it shines to one side";
     const auto ball =
         makeLight("sphere", {{"position", "[0, 0, 0]"}, {"radius", "1"}, {"intensity", "2"}});
