@@ -57,7 +57,7 @@ GridReport measureGrid(const volume::Grid& grid) {
   report.infinities = values.infinities;
   report.negatives = values.negatives;
   report.firstInvalid = values.firstInvalid;
-  if (!vector && isDensityName(report.name))
+  if (!vector && isDensityName(report.name) && !grid.isLevelSet())
     report.opticalDepth = volume::measureOpticalDepth(grid);
   const std::string name = lowered(report.name);
   if (vector && (name == "v" || name.find("vel") != name.npos) && report.voxelSize.x > 0)

@@ -97,7 +97,8 @@ void judgeGrid(const GridReport& grid, const volume::Grid& source, std::vector<s
         "has {} NaN and {} infinite voxels, the first at index ({}, {}, {}); remove them in "
         "the software that wrote it",
         grid.nans, grid.infinities, grid.firstInvalid.x, grid.firstInvalid.y, grid.firstInvalid.z));
-  if (grid.negatives > 0 && isDensityName(grid.name))
+  if (source.isLevelSet()) warn("is a level set, distances from a surface; export a fog volume");
+  if (grid.negatives > 0 && isDensityName(grid.name) && !source.isLevelSet())
     warn(fmt::format("has {} voxels of negative density (down to {:.6g})", grid.negatives,
                      grid.min));
   if (grid.hasValues && isDensityName(grid.name) && grid.max <= 0) warn("has no density above 0");

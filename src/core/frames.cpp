@@ -20,7 +20,7 @@ constexpr std::int64_t kMaxFrames = 1'000'000;  // eleven hours at 24 a second
 [[noreturn]] void badRange(std::string_view text, std::string_view part) {
   throw ConfigError(fmt::format(
       "frame range '{}': cannot read '{}' (forms: 7, 1-100, 1-100x2, 1-5y2, 5-1, -10--5, comma "
-      "between them)",
+      "between them; frames up to a billion)",
       text, part));
 }
 

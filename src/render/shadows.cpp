@@ -77,16 +77,25 @@ double thickShare(const Medium& medium, const std::vector<Segment>& rays) {
   return all > 0 ? inThick / all : 0;
 }
 
+// Steps from a place in the smoke to a lamp: through half the box.
+double stepsToLamp(const Medium& medium, float step) {
+  return 0.5 * glm::length(medium.bounds().extent()) / static_cast<double>(step);
+}
+
+// About how many nodes an upright grid has.
+double uprightNodes(const Medium& medium) {
+  return medium.majorants().filledVolume() / std::pow(medium.voxelEdge(), 3.0);
+}
+
 // Lookups of extinction that the rays of a frame take to march their shadows: a step at a time, and
-// from each as far again to the lamp; half the box either way.
+// from each as far again to the lamp.
 double marchedLookups(const Medium& medium, const std::vector<Segment>& some, std::uint64_t rays,
                       float step) {
   double steps = 0;
   for (const Segment& inside : some)
     steps += static_cast<double>(inside.length / step);
   steps /= static_cast<double>(std::max<std::size_t>(1, some.size()));
-  const double toLamp = 0.5 * glm::length(medium.bounds().extent()) / static_cast<double>(step);
-  return static_cast<double>(rays) * steps * toLamp;
+  return static_cast<double>(rays) * steps * stepsToLamp(medium, step);
 }
 
 // Smoke so few voxels across, in the mean of three directions, has no room for a grid of them: one
@@ -145,8 +154,11 @@ Shadows::Shadows(const Medium& medium, const transport::LightList& lights, Shado
   for (std::size_t i = 0; i < lights.size(); ++i) {
     if (!lights[i]->isDelta()) continue;
     const std::optional<LightDepth> depth = LightDepth::plan(medium, *lights[i]);
-    // A small frame is done sooner than a grid of much smoke, or of many times of the shutter.
-    if (depth && static_cast<double>(depth->nodes() * wanted.size()) > most) continue;
+    // A small frame is done sooner than a grid of much smoke, or of many times of the shutter; each
+    // node of an upright one is a way to the lamp.
+    const double lookups = depth ? static_cast<double>(depth->nodes())
+                                 : uprightNodes(medium) * stepsToLamp(medium, step);
+    if (lookups * static_cast<double>(wanted.size()) > most) continue;
     if (!depth && !lattice) lattice.emplace(medium, medium.voxelEdge(), 0);
     const std::uint64_t bytes = wanted.size() * (depth ? depth->predictedBytes()
                                                        : lattice->activeBricks().size() *

@@ -38,16 +38,10 @@ bool holds(const std::string& text, std::string_view word) {
   return lower.find(word) != std::string::npos;
 }
 
-bool isLevelSet(const volume::Grid& grid) {
-  const auto metadata = grid.metadata();
-  const auto found = metadata.find("class");
-  return found != metadata.end() && holds(found->second, "level set");
-}
-
 std::string chooseDensity(const CacheGrids& cache, std::vector<std::string>& choices) {
   std::vector<std::string> fog;
   for (const volume::Grid& grid : cache.grids) {
-    if (grid.kind() != volume::GridKind::scalar || isLevelSet(grid)) continue;
+    if (grid.kind() != volume::GridKind::scalar || grid.isLevelSet()) continue;
     if (grid.name() == "density") {
       choices.push_back("The grid 'density' is the smoke.");
       return "density";

@@ -21,6 +21,10 @@ constexpr double kThickShare = 0.2;                // of the smoke's cells
 constexpr double kClumps = 0.4;                    // excess density
 constexpr double kFinestVoxel = 0.5;               // of a density voxel
 constexpr std::uint64_t kMostFineBytes = 256 << 20;
+// Coarser ones where they are many, and as many times those of the smoke: voxels much longer than
+// wide, or smoke that goes far while the shutter is open.
+constexpr double kManyVoxels = 1 << 20, kManyTimes = 16;
+constexpr double kCoarsestVoxel = 64;  // of a density voxel: beyond, there is no smoke to speak of
 
 double lightVoxelEdge(const FrameSetup& setup) {
   return setup.layout.lightVoxel * setup.medium->voxelEdge();
@@ -30,6 +34,34 @@ double lightVoxelEdge(const FrameSetup& setup) {
 bool isDeep(const FrameSetup& setup, double depth) {
   const auto extinction = static_cast<float>(depth / lightVoxelEdge(setup));
   return setup.medium->majorants().shareAbove(extinction) > kThickShare;
+}
+
+// About how many light voxels the smoke takes, without a margin.
+double lightVoxels(const FrameSetup& setup) {
+  const double edge = lightVoxelEdge(setup);
+  return setup.medium->majorants().filledVolume() / (edge * edge * edge);
+}
+
+// @return whether there were too many
+bool coarsenLightVoxels(FrameSetup& setup) {
+  if (!(lightVoxels(setup) > kManyVoxels)) return false;
+  double own = 0;
+  for (const transport::MediumVolume& volume : setup.medium->volumes())
+    if (volume.densityScale > 0)
+      volume::forEachCell(volume.density, [&own](const Vec3i&, int, float) { ++own; });
+  const double most = std::max(kManyVoxels, kManyTimes * own), usual = setup.layout.lightVoxel;
+  while (lightVoxels(setup) > most && setup.layout.lightVoxel < kCoarsestVoxel)
+    setup.layout.lightVoxel *= 2;
+  // None would do: what is asked for is too much, and is refused.
+  if (lightVoxels(setup) > most) setup.layout.lightVoxel = usual;
+  if (setup.layout.lightVoxel == usual) return false;
+  setup.notes.push_back(fmt::format(
+      "{}: light is stored in voxels of {} of the smallest edge of a density voxel, as finer ones "
+      "are more than {} times as many as those of the smoke (estimator.light_voxel)",
+      setup.medium->isMoving() ? "the smoke goes far while the shutter is open"
+                               : "the smoke's voxels are much longer than wide",
+      setup.layout.lightVoxel, kManyTimes));
+  return true;
 }
 
 // How much denser smoke is than within a light voxel around it, in the mean over the smoke: 0 where
@@ -92,6 +124,7 @@ void chooseLightVoxel(const ParamValues& e, FrameSetup& setup) {
   if (e.text("type") != "photosphere" || e.given("light_voxel") || !e.text("cache").empty() ||
       l.carrier != Carrier::voxels || medium.bounds().empty())
     return;
+  if (coarsenLightVoxels(setup)) return;
   const Vec3d size = medium.bounds().extent();
   const double across = std::cbrt(size.x * size.y * size.z) / medium.voxelEdge();
   const double usual = l.lightVoxel;

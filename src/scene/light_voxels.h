@@ -14,7 +14,8 @@ inline constexpr int kMostVoxelsWide = 8;
 void chooseSmoothing(const ParamValues& estimator, FrameSetup& setup);
 
 /// Halves light voxels where the scene leaves the choice and the smoke is few of them across,
-/// several mean free paths deep in each, or in clumps of their size. After chooseSmoothing.
+/// several mean free paths deep in each, or in clumps of their size; doubles them where they are
+/// many times the smoke's own. After chooseSmoothing.
 void chooseLightVoxel(const ParamValues& estimator, FrameSetup& setup);
 
 }  // namespace photosphere::scene

@@ -65,6 +65,11 @@ double heedInvalid(const SceneFile& scene, std::string_view key, bool negatives,
                    VolumeSource& source) {
   const volume::InvalidValues found = volume::findInvalid(grid, negatives);
   if (found.total() == 0) return found.largest;
+  if (found.negatives > 0 && grid.isLevelSet())
+    throw InputError(source.path, fmt::format("grid '{}', used as {}, is a level set: distances "
+                                              "from a surface, below zero within; export a fog "
+                                              "volume (Houdini: Convert VDB)",
+                                              grid.name(), key));
   if (!scene.allowInvalid)
     throw InputError(source.path,
                      fmt::format("grid '{}', used as {}, holds {}; clean the cache, or give "

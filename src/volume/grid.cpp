@@ -65,6 +65,10 @@ bool Grid::isAffine() const {
   return m_grid && m_grid->transform().isLinear();
 }
 
+bool Grid::isLevelSet() const {
+  return m_grid && m_grid->getGridClass() == openvdb::GRID_LEVEL_SET;
+}
+
 Mat4d Grid::worldFromIndex() const {
   if (!isAffine())
     throw InputError(describe(*this),

@@ -42,6 +42,13 @@ double MajorantGrid::shareAbove(float extinction) const {
   return smoke ? static_cast<double>(above) / static_cast<double>(smoke) : 0.0;
 }
 
+double MajorantGrid::filledVolume() const {
+  const auto filled = std::count_if(m_values.begin(), m_values.end(),
+                                    [](float majorant) { return majorant > 0.0f; });
+  const Vec3d size(m_cellSize);
+  return static_cast<double>(filled) * size.x * size.y * size.z;
+}
+
 // Raises every coarse cell that a voxel cell of this source overlaps to the sum of what was there
 // before this source and the source's own maximum over the cell.
 void MajorantGrid::splat(const MajorantSource& source) {

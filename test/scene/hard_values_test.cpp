@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "fixture.h"
+#include "photosphere/transport/support_lattice.h"
 #include "photosphere/transport/tracking.h"
 #include "photosphere/volume/optical_depth.h"
 #include "photosphere/volume/rasterize.h"
@@ -88,6 +89,21 @@ TEST_F(HardValues, LightVoxelsFitTheSmoke) {
   EXPECT_EQ(setUp(few, {"estimator.light_voxel=2"}).layout.lightVoxel, 2);
   EXPECT_EQ(setUp(few, {"estimator.basis=histogram", "estimator.rows=64"}).layout.lightVoxel, 2);
   EXPECT_FALSE(notes(setUp(few, {"estimator.type=photon_map"}), "estimator.light_voxel"));
+}
+
+// Light voxels of the shortest edge would be thousands for each of the smoke's.
+TEST_F(HardValues, LightVoxelsOfLongOnesAreFew) {
+  const std::string usual = write("usual.vdb", {ballGrid("density", Vec3d(0), 1 / 12.0, 0.1f)});
+  const auto flat = [&](double height) {
+    return fmt::format("volume.0.transform=[1,0,0,0, 0,{},0,0, 0,0,1,0, 0,0,0,1]", height);
+  };
+  EXPECT_LE(setUp(usual, {flat(0.25)}).layout.lightVoxel, 2);
+  const FrameSetup sheet = setUp(usual, {flat(1e-3)});
+  EXPECT_TRUE(notes(sheet, "much longer than wide"));
+  EXPECT_GT(sheet.layout.lightVoxel, 2);
+  const double edge = sheet.layout.lightVoxel * sheet.medium->voxelEdge();
+  EXPECT_LT(transport::SupportLattice(*sheet.medium, edge, 0).size(), 8u << 20);
+  EXPECT_EQ(setUp(usual, {flat(1e-3), "estimator.light_voxel=2"}).layout.lightVoxel, 2);
 }
 
 // Balls of two voxels radius that do not touch, in a box of `voxels` across.

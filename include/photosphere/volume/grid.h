@@ -46,6 +46,8 @@ class Grid {
   Box3d worldBounds() const;
   /// False for a frustum transform, which no matrix describes.
   bool isAffine() const;
+  /// True for a signed distance, as the file says.
+  bool isLevelSet() const;
   /// Column-major GLM matrix. @throws InputError when not affine
   Mat4d worldFromIndex() const;
   /// Edge lengths of one voxel [scene units].
