@@ -17,6 +17,18 @@ std::string describe(const NumberBounds& bounds) {
   return std::isfinite(bounds.least) ? fmt::format(" of at least {}", bounds.least) : "";
 }
 
+template <class Whole>
+CLI::Validator ofType(const char* range) {
+  return {[range](std::string& text) -> std::string {
+            Whole value = 0;
+            const char* const end = text.data() + text.size();
+            const auto [next, error] = std::from_chars(text.data(), end, value);
+            if (error == std::errc() && next == end) return {};
+            return fmt::format("must be a whole number {}, not '{}'", range, text);
+          },
+          ""};
+}
+
 }  // namespace
 
 CLI::Validator finiteNumber(const NumberBounds& bounds) {
@@ -31,14 +43,11 @@ CLI::Validator finiteNumber(const NumberBounds& bounds) {
 }
 
 CLI::Validator countingNumber() {
-  return {[](std::string& text) -> std::string {
-            std::uint64_t value = 0;
-            const char* const end = text.data() + text.size();
-            const auto [next, error] = std::from_chars(text.data(), end, value);
-            if (error == std::errc() && next == end) return {};
-            return fmt::format("must be a whole number of at least 0, not '{}'", text);
-          },
-          ""};
+  return ofType<std::uint64_t>("of at least 0");
+}
+
+CLI::Validator wholeNumber() {
+  return ofType<std::int64_t>("from -2^63 to 2^63 - 1");
 }
 
 }  // namespace photosphere::cli

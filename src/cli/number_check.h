@@ -21,4 +21,8 @@ CLI::Validator finiteNumber(const NumberBounds& bounds = {});
 /// number of at least 0 that 64 bits hold.
 CLI::Validator countingNumber();
 
+/// For signed options, as CLI11 takes the nearest number for one that 64 bits do not hold: refuses
+/// that, and what is no whole number.
+CLI::Validator wholeNumber();
+
 }  // namespace photosphere::cli

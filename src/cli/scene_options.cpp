@@ -4,10 +4,10 @@
 
 #include <CLI/CLI.hpp>
 #include <array>
-#include <charconv>
 #include <filesystem>
 
 #include "frame_loop.h"
+#include "number_check.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/log.h"
 #include "photosphere/core/resources.h"
@@ -26,14 +26,6 @@ constexpr std::array kHolds = {
     NamedHold{"clip", CacheHold::clip}, NamedHold{"extend", CacheHold::extend},
     NamedHold{"repeat", CacheHold::repeat}, NamedHold{"pingpong", CacheHold::pingpong}};
 
-// The parser of options takes the nearest number where one is past what 64 bits hold.
-std::string isWholeNumber(const std::string& text) {
-  std::int64_t value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error == std::errc() && end == text.data() + text.size()) return {};
-  return fmt::format("'{}' is no whole number from -2^63 to 2^63 - 1", text);
-}
-
 void addScenePaths(CLI::App& app, SceneOptions& options) {
   app.add_option("SCENE", options.scene, "Scene (.toml), or a cache for which one is made up")
       ->type_name("FILE")
@@ -44,7 +36,7 @@ void addScenePaths(CLI::App& app, SceneOptions& options) {
       ->allow_extra_args(false);
   app.add_option("--seed", options.seed, "Replaces scene.seed")
       ->type_name("N")
-      ->check(isWholeNumber);
+      ->check(wholeNumber());
   app.add_option("--res", options.resolution, "Replaces camera.resolution")->type_name("WxH");
   app.add_option("--colorspace", options.colorspace, "Replaces output.colorspace")
       ->type_name("NAME");

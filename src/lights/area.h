@@ -6,6 +6,7 @@
 
 #include "cone.h"
 #include "photosphere/core/sampling.h"
+#include "photosphere/core/sequence.h"
 #include "rows.h"
 #include "spherical_rectangle.h"
 
@@ -176,23 +177,12 @@ class SurfaceLight : public Light {
     const Cone seen = coneToward(Vec3d(distance, 0, 0), {Vec3d(0), bounds.radius});
     return std::min(kPi, seen.solidAngle()) * area() > most;
   }
-  // What of the lines comes from the lamp [m^2 sr], 0 only where none can, by points of the
-  // sequence of Roberts 2018, "The unreasonable effectiveness of quasirandom sequences", whose
-  // steps are powers of the root of x^5 = x + 1.
+  // What of the lines comes from the lamp [m^2 sr], by so many; 0 only where none can.
   double etendueOfLines(const BoundingSphere& bounds, int count) const {
-    constexpr double kRoot = 1.1673039782614187;
-    constexpr double kSteps[] = {1 / kRoot, 1 / (kRoot * kRoot), 1 / (kRoot * kRoot * kRoot),
-                                 1 / (kRoot * kRoot * kRoot * kRoot)};
     if (isBehind(bounds)) return 0;
     int met = 0;
-    for (int i = 0; i < count; ++i) {
-      Vec4f u;
-      for (int k = 0; k < 4; ++k) {
-        const double x = 0.5 + (i + 1) * kSteps[k];
-        u[k] = static_cast<float>(x - std::floor(x));
-      }
-      met += lineThrough(bounds, u).start.has_value();
-    }
+    for (int i = 1; i <= count; ++i)
+      met += lineThrough(bounds, evenPoint(static_cast<std::uint64_t>(i))).start.has_value();
     return lines(bounds) * std::max(1, met) / count;
   }
 

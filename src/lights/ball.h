@@ -17,9 +17,8 @@ inline Rgb ballRadiance(const Rgb& intensity, double radius) {
 /// @param to         from where one looks to the centre [m]
 /// @param direction  unit
 inline double distanceToBall(const Vec3d& to, const Vec3d& direction, double radius) {
-  const double along = glm::dot(to, direction);
-  const Vec3d beside = to - direction * along;  // from the ray's nearest point to the centre
-  return along - std::sqrt(std::max(0.0, radius * radius - glm::dot(beside, beside)));
+  const Chord chord(to, direction, radius);
+  return chord.middle - std::sqrt(std::max(0.0, chord.halfSquared));
 }
 
 /// A ball of even radiance, dark inside.
@@ -68,14 +67,10 @@ class BallLight : public SurfaceLight {
     return coneToward(m_center, {bounds.center, bounds.radius + m_radius});
   }
   std::optional<double> departs(const Vec3d& origin, const Vec3d& direction) const override {
-    const Vec3d to = m_center - origin;
-    const double along = glm::dot(to, direction);
-    const Vec3d beside = to - direction * along;
-    const double squared = m_radius * m_radius - glm::dot(beside, beside);
-    if (!(squared > 0)) return {};
-    return along + std::sqrt(squared);
+    const Chord chord(m_center - origin, direction, m_radius);
+    if (!(chord.halfSquared > 0)) return {};
+    return chord.middle + std::sqrt(chord.halfSquared);
   }
-
   bool isBehind(const BoundingSphere& bounds) const override {
     return glm::length(bounds.center - m_center) + bounds.radius <= m_radius;
   }

@@ -32,6 +32,19 @@ inline Cone coneToward(const Vec3d& from, const BoundingSphere& bounds) {
   return {d / std::sqrt(squared), sineSquared / (1 + std::sqrt(1 - sineSquared))};
 }
 
+/// A line and a ball: where the line is nearest to the centre, and the square of half its chord.
+struct Chord {
+  double middle = 0;       ///< along the line [m]
+  double halfSquared = 0;  ///< below 0 where it misses the ball [m^2]
+
+  /// @param to         from where the line is counted to the centre [m]
+  /// @param direction  unit
+  Chord(const Vec3d& to, const Vec3d& direction, double radius) : middle(glm::dot(to, direction)) {
+    const Vec3d beside = to - direction * middle;
+    halfSquared = radius * radius - glm::dot(beside, beside);
+  }
+};
+
 /// Unit vectors across a unit axis (Duff et al. 2017), in double.
 struct Across {
   Vec3d x, y;

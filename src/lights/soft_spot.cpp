@@ -165,11 +165,8 @@ class SoftSpot final : public Light {
   }
 
   static bool reaches(const BoundingSphere& bounds, const Vec3d& origin, const Vec3d& direction) {
-    const Vec3d to = bounds.center - origin;
-    const double ahead = glm::dot(to, direction);
-    const Vec3d beside = to - direction * ahead;
-    const double squared = bounds.radius * bounds.radius - glm::dot(beside, beside);
-    return squared > 0 && ahead + std::sqrt(squared) > 0;
+    const Chord chord(bounds.center - origin, direction, bounds.radius);
+    return chord.halfSquared > 0 && chord.middle + std::sqrt(chord.halfSquared) > 0;
   }
 
   // Over directions: the spot's intensity times the share of its lines that meet the sphere.

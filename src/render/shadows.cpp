@@ -82,11 +82,6 @@ double stepsToLamp(const Medium& medium, float step) {
   return 0.5 * glm::length(medium.bounds().extent()) / static_cast<double>(step);
 }
 
-// About how many nodes an upright grid has.
-double uprightNodes(const Medium& medium) {
-  return medium.majorants().filledVolume() / std::pow(medium.voxelEdge(), 3.0);
-}
-
 // Lookups of extinction that the rays of a frame take to march their shadows: a step at a time, and
 // from each as far again to the lamp.
 double marchedLookups(const Medium& medium, const std::vector<Segment>& some, std::uint64_t rays,
@@ -156,8 +151,9 @@ Shadows::Shadows(const Medium& medium, const transport::LightList& lights, Shado
     const std::optional<LightDepth> depth = LightDepth::plan(medium, *lights[i]);
     // A small frame is done sooner than a grid of much smoke, or of many times of the shutter; each
     // node of an upright one is a way to the lamp.
-    const double lookups = depth ? static_cast<double>(depth->nodes())
-                                 : uprightNodes(medium) * stepsToLamp(medium, step);
+    const double lookups =
+        depth ? static_cast<double>(depth->nodes())
+              : medium.majorants().cubesInside(medium.voxelEdge()) * stepsToLamp(medium, step);
     if (lookups * static_cast<double>(wanted.size()) > most) continue;
     if (!depth && !lattice) lattice.emplace(medium, medium.voxelEdge(), 0);
     const std::uint64_t bytes = wanted.size() * (depth ? depth->predictedBytes()

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "photosphere/core/parallel.h"
+#include "photosphere/core/sequence.h"
 #include "photosphere/transport/photon_tracer.h"
 #include "photosphere/transport/scatter.h"
 #include "photosphere/transport/tracking.h"
@@ -98,7 +99,7 @@ double hittingShare(const Medium& medium, const transport::LightList& lights) {
   double hits = 0, all = 0;
   for (std::size_t i = 0; i < std::min(lights.size(), kMostLamps); ++i)
     for (std::uint64_t n = 0; n < kTries; ++n) {
-      const lights::Emission birth = lights[i]->emit(bounds, transport::evenPoint(n));
+      const lights::Emission birth = lights[i]->emit(bounds, evenPoint(n));
       const double power = maxComponent(Vec3d(birth.power));
       if (!(power > 0)) continue;
       all += power;

@@ -24,7 +24,7 @@ constexpr std::uint64_t kMostFineBytes = 256 << 20;
 // Coarser ones where they are many, and as many times those of the smoke: voxels much longer than
 // wide, or smoke that goes far while the shutter is open.
 constexpr double kManyVoxels = 1 << 20, kManyTimes = 16;
-constexpr double kCoarsestVoxel = 64;  // of a density voxel: beyond, there is no smoke to speak of
+constexpr double kCoarsestVoxel = 64;  // of a density voxel; more would tell next to nothing
 
 double lightVoxelEdge(const FrameSetup& setup) {
   return setup.layout.lightVoxel * setup.medium->voxelEdge();
@@ -36,31 +36,27 @@ bool isDeep(const FrameSetup& setup, double depth) {
   return setup.medium->majorants().shareAbove(extinction) > kThickShare;
 }
 
-// About how many light voxels the smoke takes, without a margin.
-double lightVoxels(const FrameSetup& setup) {
-  const double edge = lightVoxelEdge(setup);
-  return setup.medium->majorants().filledVolume() / (edge * edge * edge);
-}
-
-// @return whether there were too many
+// @return whether there were too many, of which coarser ones are not
 bool coarsenLightVoxels(FrameSetup& setup) {
-  if (!(lightVoxels(setup) > kManyVoxels)) return false;
+  double voxels = setup.medium->majorants().cubesInside(lightVoxelEdge(setup));
+  if (!(voxels > kManyVoxels)) return false;
   double own = 0;
   for (const transport::MediumVolume& volume : setup.medium->volumes())
     if (volume.densityScale > 0)
       volume::forEachCell(volume.density, [&own](const Vec3i&, int, float) { ++own; });
   const double most = std::max(kManyVoxels, kManyTimes * own), usual = setup.layout.lightVoxel;
-  while (lightVoxels(setup) > most && setup.layout.lightVoxel < kCoarsestVoxel)
-    setup.layout.lightVoxel *= 2;
-  // None would do: what is asked for is too much, and is refused.
-  if (lightVoxels(setup) > most) setup.layout.lightVoxel = usual;
-  if (setup.layout.lightVoxel == usual) return false;
+  double coarser = usual;
+  for (; voxels > most && coarser < kCoarsestVoxel; voxels /= 8)
+    coarser *= 2;
+  // Where none would do, too much is asked for, which is refused later.
+  if (voxels > most || coarser == usual) return false;
+  setup.layout.lightVoxel = coarser;
   setup.notes.push_back(fmt::format(
       "{}: light is stored in voxels of {} of the smallest edge of a density voxel, as finer ones "
       "are more than {} times as many as those of the smoke (estimator.light_voxel)",
       setup.medium->isMoving() ? "the smoke goes far while the shutter is open"
                                : "the smoke's voxels are much longer than wide",
-      setup.layout.lightVoxel, kManyTimes));
+      coarser, kManyTimes));
   return true;
 }
 

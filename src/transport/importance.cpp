@@ -6,6 +6,7 @@
 #include "photosphere/core/fast_math.h"
 #include "photosphere/core/parallel.h"
 #include "photosphere/core/sampling.h"
+#include "photosphere/core/sequence.h"
 #include "photosphere/transport/photon_tracer.h"
 #include "photosphere/transport/tracking.h"
 
@@ -51,18 +52,6 @@ double within(std::size_t cell, double place) {
 }
 
 }  // namespace
-
-Vec4f evenPoint(std::uint64_t n) {
-  // Powers of the inverse of the root of x^5 = x + 1.
-  constexpr double alphas[] = {0.8566748838545029, 0.733891856627126, 0.6287067210378087,
-                               0.5385972572236101};
-  Vec4f point;
-  for (int i = 0; i < 4; ++i) {
-    const double u = 0.5 + alphas[i] * static_cast<double>(n);
-    point[i] = static_cast<float>(std::min(u - std::floor(u), 1.0 - 0x1p-24));
-  }
-  return point;
-}
 
 ImportanceMap::ImportanceMap(const Box3d& bounds, int cells) {
   const Vec3d extent = bounds.extent();

@@ -42,10 +42,10 @@ double MajorantGrid::shareAbove(float extinction) const {
   return smoke ? static_cast<double>(above) / static_cast<double>(smoke) : 0.0;
 }
 
-double MajorantGrid::filledVolume() const {
+double MajorantGrid::cubesInside(double edge) const {
   const auto filled = std::count_if(m_values.begin(), m_values.end(),
                                     [](float majorant) { return majorant > 0.0f; });
-  const Vec3d size(m_cellSize);
+  const Vec3d size = Vec3d(m_cellSize) / edge;
   return static_cast<double>(filled) * size.x * size.y * size.z;
 }
 

@@ -12,11 +12,11 @@
 #include "photosphere/caches/cache_format.h"
 #include "photosphere/core/checkpoint.h"
 #include "photosphere/core/error.h"
-#include "photosphere/core/log.h"
 #include "photosphere/estimators/light_cache.h"
 #include "photosphere/estimators/light_shard.h"
 #include "photosphere/image/exr.h"
 #include "photosphere/volume/vdb_file.h"
+#include "support/log_level.h"
 #include "support/support.h"
 #include "support/uni_files.h"
 #include "targets.h"
@@ -65,22 +65,18 @@ std::vector<CacheContent> contents() {
 std::string written(const caches::CacheFormat& format, const std::string& file,
                     const char* encoding = nullptr) {
   const TemporaryFolder folder;
-  const log::Level level = log::level();
-  log::setLevel(log::Level::off);  // of what a format cannot hold
+  const test::LogLevel quiet(log::Level::off);  // of what a format cannot hold
   ParamValues options(format.params);
   if (encoding) options.set("encoding", std::string(encoding), "specimen");
-  std::string bytes;
   for (const CacheContent& content : contents()) {
     try {
       format.write(folder / file, content, options);
-      bytes = test::readText(folder / file);
-      break;
+      return test::readText(folder / file);
     } catch (const ConfigError&) {
       // Not what this format holds.
     }
   }
-  log::setLevel(level);
-  return bytes;
+  return {};
 }
 
 void addWritten(std::vector<Specimen>& all) {

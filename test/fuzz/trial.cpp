@@ -12,8 +12,8 @@
 
 #include "allocation_limit.h"
 #include "photosphere/core/error.h"
-#include "photosphere/core/log.h"
 #include "photosphere/core/resources.h"
+#include "support/log_level.h"
 
 namespace photosphere::fuzz {
 
@@ -186,15 +186,13 @@ Outcomes attempt(const Target& target, std::size_t count,
                  const std::function<std::string(std::size_t)>& input,
                  const std::function<std::string(std::size_t)>& what) {
   const test::TemporaryFolder folder;
-  const log::Level level = log::level();
-  log::setLevel(log::Level::off);
+  const test::LogLevel quiet(log::Level::off);
   Outcomes outcomes;
   if (target.isolated)
     outcomes = giveInChildren(target, count, input, what, folder.path());
   else
     for (std::size_t i = 0; i < count; ++i)
       giveHere(target, input(i), what(i), folder.path(), outcomes);
-  log::setLevel(level);
   return outcomes;
 }
 

@@ -12,10 +12,6 @@ namespace photosphere::transport {
 
 class Medium;
 
-/// Point n of the R4 sequence (Roberts 2018): four numbers in [0, 1), evenly spread, that stay
-/// below 1 as floats.
-Vec4f evenPoint(std::uint64_t n);
-
 /// Coarse lattice of cubes over the smoke: in each, how much the picture gains on the mean from a
 /// photon that leaves a collision there (adjoint fluence; any unit). Local space [m].
 class ImportanceMap {

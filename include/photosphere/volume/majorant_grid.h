@@ -56,8 +56,9 @@ class MajorantGrid {
   float maximum() const { return m_maximum; }
   /// Share of the cells that are not empty whose majorant is more than `extinction` [0, 1].
   double shareAbove(float extinction) const;
-  /// Volume of the cells that are not empty: where smoke is, or may come [m^3].
-  double filledVolume() const;
+  /// About how many cubes of that edge fill the cells that are not empty, where smoke is or may
+  /// come. @param edge  [m]
+  double cubesInside(double edge) const;
   std::uint64_t memoryBytes() const { return m_values.size() * sizeof(float); }
 
   /// Walks the cells along a ray in order.
