@@ -15,12 +15,13 @@ namespace {
 
 std::atomic<int> g_signal{0};
 std::atomic<int> g_delays{0};
+thread_local int t_shields = 0;
 static_assert(std::atomic<int>::is_always_lock_free);  // for handlers
 
 void onSignal(int signal) {
   // Two may come at the same time, to two threads.
   if (g_signal.exchange(signal) == 0) return;
-  removeTemporaries();
+  endOutputs();
   _exit(128 + signal);
 }
 
@@ -46,7 +47,7 @@ int pendingSignal() {
 }
 
 void throwIfInterrupted() {
-  if (g_signal != 0 && g_delays == 0) throw InterruptedError(g_signal);
+  if (g_signal != 0 && g_delays == 0 && t_shields == 0) throw InterruptedError(g_signal);
 }
 
 InterruptDelay::InterruptDelay() {
@@ -55,6 +56,14 @@ InterruptDelay::InterruptDelay() {
 
 InterruptDelay::~InterruptDelay() {
   --g_delays;
+}
+
+InterruptShield::InterruptShield() {
+  ++t_shields;
+}
+
+InterruptShield::~InterruptShield() {
+  --t_shields;
 }
 
 }  // namespace photosphere

@@ -3,8 +3,10 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/stat.h>
+#include <time.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cerrno>
@@ -25,6 +27,8 @@ struct Slot {
   std::array<char, 4096> path{};
 };
 std::array<Slot, 64> g_slots;
+std::atomic<bool> g_ending{false};                      // no temporary may come into being any more
+static_assert(std::atomic<bool>::is_always_lock_free);  // for handlers
 
 int claimSlot(const std::string& path) {
   for (std::size_t i = 0; i < g_slots.size(); ++i) {
@@ -49,14 +53,48 @@ void syncPath(const fs::path& path, int flags) {
     throw OutputError(path.string(), "cannot flush to disk: " + describeWriteError(failed));
 }
 
+// Bytes that a file's name may have in a folder.
+std::size_t longestName(const fs::path& folder) {
+  const long most = pathconf(folder.c_str(), _PC_NAME_MAX);
+  return most > 0 ? static_cast<std::size_t>(most) : 255;
+}
+
+bool isOfProcess(const fs::path& path) {
+  const std::string name = path.string();
+  return name.starts_with("/dev/") || name.starts_with("/proc/");
+}
+
+// Name of the temporary of a target. Keeps the extension, by which some libraries choose the
+// format; of the rest what there is room for. Those of two long names that begin alike differ.
+std::string temporaryName(const fs::path& target, std::size_t longest) {
+  static std::atomic<unsigned> shortened{0};
+  std::string stem = target.stem().string();
+  const std::string extension = target.extension().string();
+  std::string mark = fmt::format(".tmp-photosphere-{}", getpid());
+  if (1 + stem.size() + mark.size() + extension.size() > longest) {
+    mark += fmt::format("-{}", ++shortened);
+    const std::size_t rest = 1 + mark.size() + extension.size();
+    stem.resize(std::min(stem.size(), longest > rest ? longest - rest : 0));
+  }
+  return "." + stem + mark + extension;
+}
+
 }  // namespace
 
 OutputFile::OutputFile(const fs::path& target) : m_target(target) {
+  while (g_ending)
+    usleep(1000);
   std::error_code error;
   const fs::file_status status = fs::status(target, error);
   if (fs::is_directory(status))
     throw OutputError(target.string(), "is a folder; name a file in it");
+  if (error && status.type() == fs::file_type::none)
+    throw OutputError(target.string(), "cannot be written: " + describeWriteError(error.value()));
   if (fs::exists(status) && !fs::is_regular_file(status)) {
+    // Opening one would wait for a reader, after all the work. Those of the process itself, such as
+    // /dev/stdout, have theirs.
+    if ((fs::is_fifo(status) || fs::is_socket(status)) && !isOfProcess(target))
+      throw OutputError(target.string(), "is a pipe or a socket; name a file");
     m_temporary = target;
     return;
   }
@@ -70,10 +108,22 @@ OutputFile::OutputFile(const fs::path& target) : m_target(target) {
                                            describeWriteError(error.value()));
   if (access(folder.c_str(), W_OK) != 0)
     throw OutputError(target.string(), "cannot write in its folder: " + describeWriteError(errno));
-  // Keeps the extension, by which some libraries choose the format.
-  m_temporary = folder / fmt::format(".{}.tmp-photosphere-{}{}", m_target.stem().string(), getpid(),
-                                     m_target.extension().string());
+  const std::size_t longest = longestName(folder);
+  if (const std::size_t bytes = m_target.filename().string().size(); bytes > longest)
+    throw OutputError(target.string(),
+                      fmt::format("the name has {} bytes, of which the file system takes {}; name "
+                                  "it shorter",
+                                  bytes, longest));
+  m_temporary = folder / temporaryName(m_target, longest);
   m_slot = claimSlot(fs::absolute(m_temporary).string());
+  // Some file systems tell only now that they take no file.
+  const int fd = open(m_temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  if (fd < 0) {
+    const int reason = errno;
+    if (m_slot >= 0) g_slots[static_cast<std::size_t>(m_slot)].state = 0;
+    throw OutputError(target.string(), "cannot create: " + describeWriteError(reason));
+  }
+  close(fd);
 }
 
 OutputFile::~OutputFile() {
@@ -133,6 +183,15 @@ std::string describeWriteError(int error) {
 void removeTemporaries() noexcept {
   for (Slot& slot : g_slots)
     if (slot.state == 2) unlink(slot.path.data());
+}
+
+void endOutputs() noexcept {
+  g_ending = true;
+  removeTemporaries();
+  // Another thread may have named a temporary, and be about to create it.
+  const timespec moment = {0, 50'000'000};
+  nanosleep(&moment, nullptr);
+  removeTemporaries();
 }
 
 }  // namespace photosphere

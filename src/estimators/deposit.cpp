@@ -113,7 +113,7 @@ void VoxelSink::depositCollision(const B& basis, const typename B::Along& along,
   const std::int32_t voxel = m_lattice.number(Vec3i(glm::floor(cell)));
   if (voxel < 0) return;
   std::uint32_t counter = 0;
-  Rgb amount = flight.power / flight.extinctionAtEnd;
+  Rgb amount = flight.collisionPower() / flight.extinctionAtEnd;
   if (m_means && !((*m_means)[static_cast<std::size_t>(voxel)] > 0.0f)) return;
   if (m_weight)
     amount *= m_weight->at(static_cast<std::size_t>(voxel), p, direction(flight, counter));
@@ -132,8 +132,9 @@ void ParticleSink::consume(std::span<const Flight> flights) {
           findTargets(flight.origin + flight.direction * flight.length, targets);
           std::uint32_t counter = 0;
           for (const Target& target : targets)
-            m_carriers.add(basis, along, flight, target.first, set, flight.power * target.second,
-                           m_positions[target.first], counter);
+            m_carriers.add(basis, along, flight, target.first, set,
+                           flight.collisionPower() * target.second, m_positions[target.first],
+                           counter);
         }
       },
       m_carriers.basis());

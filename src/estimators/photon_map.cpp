@@ -101,7 +101,8 @@ class CollisionSink final : public transport::FlightSink {
     const Vec3f p = flight.origin + flight.direction * flight.length;
     const Vec3f& d = flight.direction;
     batch.values.insert(batch.values.end(), {p.x, p.y, p.z, d.x, d.y, d.z});
-    batch.values.insert(batch.values.end(), &flight.power.x, &flight.power.x + m_channels);
+    const Rgb power = flight.collisionPower();
+    batch.values.insert(batch.values.end(), &power.x, &power.x + m_channels);
   }
 
   int m_channels;

@@ -23,7 +23,7 @@ RayOpacity::Place RayOpacity::sample(float u) const {
   const float inside =
       depth > 1e-3f ? -fastLog(1.0f - part * (1.0f - fastExp(-depth))) / depth : part;
   const float mean = meanComponent(at->removed);
-  return {at->begin + at->length * std::min(inside, 1.0f),
+  return {at->begin + at->length * std::min(inside, 1.0f), at->begin + 0.5f * at->length,
           mean > 0.0f ? at->removed / mean : Rgb(1.0f)};
 }
 
@@ -56,7 +56,9 @@ Rgb FinalGather::multiple(const transport::Segment& ray, const RayOpacity& opaci
   for (int i = 0; i < m_rays; ++i) {
     const RayOpacity::Place place =
         opacity.sample((static_cast<float>(i) + rng.uniform()) * stratum);
-    const Vec3f p = ray.origin + ray.direction * place.distance;
+    Vec3f p = ray.origin + ray.direction * place.distance;
+    // Part of a step may lie outside the smoke; its middle does not.
+    if (!(m_medium.extinction(p, when) > 0.0f)) p = ray.origin + ray.direction * place.middle;
     const transport::ScatterEvent event = scatterAt(p, ray.direction, place.removed, rng, when);
     if (event.survived)
       sum += arriving<Light>(p, event.direction, place.removed * event.weight, rng, counters, when);
@@ -72,7 +74,7 @@ Rgb FinalGather::arriving(Vec3f p, const Vec3f& d, const Rgb& power, Rng& rng,
   Rgb radiance(0.0f), left = power;
   while (true) {
     const Collision hit =
-        transport::sampleCollision(m_medium, p, d, kInfinity, rng, counters.tracking, when);
+        transport::sampleCollisionOf(left, m_medium, p, d, kInfinity, rng, counters.tracking, when);
     if (m_emission)
       radiance +=
           left * transport::sampleEmission(m_medium, *m_emission, p, d, hit.distance, rng, when);
@@ -84,14 +86,16 @@ Rgb FinalGather::arriving(Vec3f p, const Vec3f& d, const Rgb& power, Rng& rng,
     if (!(c.extinction > 0.0f)) return radiance;
     const estimators::Inscatter in = m_source.at(m_medium.carrierOf(p, when), -d, c);
     const Rgb lamps = m_direct.at<Light>(p, -d, c, nullptr, rng, counters, when);
-    radiance += left * (lamps + in.single + in.multiple) / c.extinction;
+    const float rate = c.extinction * hit.share;
+    radiance += left * (lamps + in.single + in.multiple) / rate;
     if constexpr (std::is_same_v<Light, float>) return radiance;
     // Each channel passes by its own chance what was a collision for the densest.
-    const Rgb passes = transport::passingChance(c, m_medium.channels(p, c.extinction, when));
+    const Rgb passes = transport::passingChance(rate, m_medium.channels(p, c.extinction, when));
     const float sum = left.x + left.y + left.z;
     const float pass = sum > 0.0f ? glm::dot(left, passes) / sum : 0.0f;
     if (!(rng.uniform() < pass)) return radiance;
     left *= passes / pass;
+    left *= transport::rouletteOfFaint(left, rng);
   }
 }
 

@@ -14,7 +14,7 @@ namespace photosphere::render {
 class RayOpacity {
  public:
   void clear() { m_steps.clear(); }
-  /// @param extinction  mean of the channels'
+  /// @param extinction  of several channels, the mean by what the step takes out of each [1/m]
   /// @param opacity     of the ray up to the end of this step, mean of the channels
   /// @param removed     light that this step takes out of each channel
   void add(float t0, float t1, float extinction, float opacity, const Rgb& removed) {
@@ -24,6 +24,7 @@ class RayOpacity {
   float total() const { return m_steps.empty() ? 0.0f : m_steps.back().opacity; }
   struct Place {
     float distance;  ///< [m]
+    float middle;    ///< of the step that it lies in [m]
     Rgb removed;     ///< there, in ratio to the mean of the channels: 1 where they are alike
   };
   /// Drawn in proportion to transmittance times extinction. @param u  in [0, 1)

@@ -285,8 +285,8 @@ class EyeSink final : public transport::FlightSink {
             depositHash(m_options.key, flight.photon, flight.ordinal, ~0u));
     const auto sight = m_eye.see(p, rng);
     if (!sight || !m_film.reaches(sight->raster)) return;
-    const Rgb scattered =
-        flight.power * transport::phaseAlbedo(m_medium, p, flight.direction, sight->direction);
+    const Rgb scattered = flight.collisionPower() *
+                          transport::phaseAlbedo(m_medium, p, flight.direction, sight->direction);
     if (!(maxComponent(scattered) > 0.0f)) return;
     const float inside = transport::exitDistance(m_medium, p, sight->direction);
     const Light passed = transport::trackTransmittance<Light>(

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <type_traits>
 
@@ -42,6 +43,34 @@ float meanOf(float value) {
 float meanOf(const Rgb& value) {
   return meanComponent(value);
 }
+// Extinction that light met, of several channels the mean by what each lost.
+float metBy(float, float extinction) {
+  return extinction;
+}
+float metBy(const Rgb& removed, const Rgb& extinction) {
+  const float sum = removed.x + removed.y + removed.z;
+  return sum > 0.0f ? glm::dot(removed, extinction) / sum : meanComponent(extinction);
+}
+
+// Part of a step that is next to nothing.
+constexpr float kBeside = 1e-3f;
+
+// Whether smoke begins gradually where it begins, rather than with a jump.
+// @param within  extinction farther in
+bool isFoot(float extinction, float within) {
+  return extinction <= 0.5f * within;
+}
+
+// What the light that is left needs of the densest channel's extinction (Medium::livingShare).
+// Channels end one by one, so that one that has ended does not keep the others at its pace.
+float livingShare(const Medium&, float) {
+  return 1.0f;
+}
+float livingShare(const Medium& medium, Rgb& transmittance) {
+  for (int channel = 0; channel < 3; ++channel)
+    if (transmittance[channel] < kOpaque) transmittance[channel] = 0.0f;
+  return medium.livingShare(transmittance);
+}
 
 // Light is what transmittances are made of: float, or Rgb where extinction differs from channel to
 // channel. When is Still, or Moment where the smoke moves.
@@ -61,6 +90,7 @@ class MarchIntegrator final : public Integrator {
     if (m_emission)
       m_step = std::min(m_step, static_cast<float>(m_emission->region().spacing) * options.step);
     m_stepsPerLength = 1.0f / m_step;
+    m_voxel = static_cast<float>(medium.voxelEdge()) * 1.001f;
     m_thick = kStepDepth / (m_step * kFinest);
     if (source && options.gatherRays > 0)
       m_gather.emplace(medium, m_direct.withShadows(), *source, options.effects,
@@ -94,19 +124,25 @@ class MarchIntegrator final : public Integrator {
 
  private:
   // Steps lie on one lattice along the ray, offset at random, so that neighbouring rays do not
-  // band; cells without extinction and emission are skipped.
+  // band; cells without extinction and emission are skipped. The midpoint rule gives too much where
+  // smoke has its ridge and too little at its feet, which is right on the mean of all offsets: so
+  // the step over a foot is a whole one too, though part of it lies outside. Smoke that ends at a
+  // face, where its extinction jumps, is integrated up to the face.
   Light march(const Segment& ray, When when, RayOpacity* opacity, RayRadiance& result, Rng& rng,
               IntegratorCounters& counters) const {
     Light transmittance(1.0f);
     const auto extinction = m_medium.alongRay(ray.origin, ray.direction, when);
     const float offset = rng.uniform();
-    float done = 0.0f;  // the ray is integrated up to here
+    // The ray is integrated up to here.
+    float done = ray.begin > 0.0 ? -kInfinity : 0.0f;
     for (volume::MajorantGrid::Walk walk(m_medium.majorants(), ray.origin, ray.direction, 0.0f,
                                          ray.length);
          !walk.done(); walk.advance()) {
       if (!(walk.majorant() > 0.0f) && !(m_emission && m_emission->inCell(walk.cell()))) continue;
+      throwIfInterrupted();
       const float end = walk.end();
-      if (walk.majorant() > m_thick) {
+      const float majorant = walk.majorant() * livingShare(m_medium, transmittance);
+      if (majorant > m_thick) {
         const MarchStep rest{ray, std::max(done, walk.begin()), end};
         if (!marchThick(rest, walk.majorant(), extinction, when, transmittance, opacity, result,
                         rng, counters))
@@ -117,22 +153,39 @@ class MarchIntegrator final : public Integrator {
       // The source inside a step varies by the extinction of the light on its way in, which the
       // midpoint rule sees to (depth)^2 / 24: dense smoke takes finer steps, in powers of two of
       // one lattice.
-      float h = m_step, perLength = m_stepsPerLength;
-      while (h * walk.majorant() > kStepDepth && h > m_step * kFinest) {
+      const float coarser = m_emission ? 1.0f : m_medium.majorants().coarseness(walk.cell());
+      float h = m_step * coarser, perLength = m_stepsPerLength / coarser;
+      while (h * majorant > kStepDepth && h > m_step * kFinest) {
         h *= 0.5f;
         perLength *= 2.0f;
       }
+      Vec3f carrier(0.0f);  // read where smoke moves
+      const auto rises = [&](float from, float to) {
+        return isFoot(extinctionAt(extinction, ray, from, when, carrier),
+                      extinctionAt(extinction, ray, to, when, carrier));
+      };
       float t0 = std::max(done, walk.begin());
       // The next point of the step lattice beyond t0; a step may run on past the cell, where the
       // following cell then begins later.
-      for (auto k = static_cast<float>(static_cast<int>(t0 * perLength - offset + 1.0f)); t0 < end;
-           k += 1.0f) {
-        const float t1 = std::min((k + offset) * h, ray.length);
-        if (!(t1 > t0 + 1e-3f * h)) {
+      double k = std::floor(static_cast<double>(t0) * static_cast<double>(perLength) -
+                            static_cast<double>(offset)) +
+                 1.0;
+      const auto place = [&](double number) {
+        return static_cast<float>((number + static_cast<double>(offset)) * static_cast<double>(h));
+      };
+      const bool whole = h <= coarser * m_voxel;  // else features are shorter than steps
+      if (whole && done < t0 && rises(t0 + kBeside * h, 0.5f * (t0 + place(k))))
+        t0 = std::max(done, place(k - 1.0));
+      for (; t0 < end; k += 1.0) {
+        float t1 = place(k);
+        if (coarser > 1.0f) t1 = upToFiner(walk, t1, coarser);
+        if (t1 > ray.length &&
+            !(whole && rises(ray.length - kBeside * h, 0.5f * (t0 + ray.length))))
+          t1 = ray.length;
+        if (!(t1 > t0 + kBeside * h)) {
           if (t1 == ray.length) break;
           continue;
         }
-        Vec3f carrier(0.0f);  // read where smoke moves
         const float sigma = extinctionAt(extinction, ray, 0.5f * (t0 + t1), when, carrier);
         if (sigma > 0.0f)
           transmittance = step({ray, t0, t1}, sigma, carrier, when, transmittance, opacity, result,
@@ -149,6 +202,13 @@ class MarchIntegrator final : public Integrator {
     return transmittance;
   }
 
+  // A step of some coarseness, unless it would run on into a cell of finer voxels: up to that.
+  float upToFiner(volume::MajorantGrid::Walk walk, float t1, float coarser) const {
+    for (; !walk.done() && walk.begin() < t1; walk.advance())
+      if (m_medium.majorants().coarseness(walk.cell()) < coarser) return walk.begin();
+    return t1;
+  }
+
   // A cell where the finest steps of the lattice would be too coarse: each step is as long as keeps
   // its own depth small. @return false when the ray has ended dark
   template <class Along>
@@ -158,11 +218,12 @@ class MarchIntegrator final : public Integrator {
     const float steepness = m_medium.steepness();
     for (float t0 = cell.t0; t0 < cell.t1;) {
       Vec3f carrier(0.0f);
+      const float share = livingShare(m_medium, transmittance);
       const float here = transport::extinctionOnward(
           [&](float t) { return extinctionAt(extinction, cell.ray, t, when, carrier); }, t0,
           1.0f / steepness);
-      const float part =
-          std::min(m_step, transport::thinPart(here, majorant * steepness, kStepDepth));
+      const float part = std::min(
+          m_step, transport::thinPart(here * share, majorant * share * steepness, kStepDepth));
       const float t1 = std::min(t0 + std::max(part, transport::kDistanceResolution * t0), cell.t1);
       const float middle = 0.5f * (t0 + t1);
       const float sigma = extinctionAt(extinction, cell.ray, middle, when, carrier);
@@ -224,7 +285,7 @@ class MarchIntegrator final : public Integrator {
     const float absorbed = meanOf(removed);
     result.opacity += absorbed;
     result.depth += absorbed * (static_cast<float>(ray.begin) + t);
-    if (opacity) opacity->add(step.t0, step.t1, meanOf(own), result.opacity, Rgb(removed));
+    if (opacity) opacity->add(step.t0, step.t1, metBy(removed, own), result.opacity, Rgb(removed));
     return transmittance * attenuated;
   }
 
@@ -236,6 +297,7 @@ class MarchIntegrator final : public Integrator {
   const transport::Emission* m_emission;  // nullptr where there is none
   float m_step;                           // [m]
   float m_stepsPerLength;                 // its inverse
+  float m_voxel;                          // of the finest volume [m]
   float m_thick;                          // extinction from where on steps choose their length
   std::optional<FinalGather> m_gather;
 };

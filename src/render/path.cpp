@@ -68,9 +68,9 @@ class PathIntegrator final : public Integrator {
       Collision hit;
       if (begins) forced = isForced(scatterings, result.transmittance);
       if (begins && forced) {
-        const auto all =
-            transport::forceCollision<Light>(m_medium, segment.origin, segment.direction,
-                                             lengthOf(segment), rng, counters.tracking, when);
+        const auto all = transport::forceCollision<Light>(throughput, m_medium, segment.origin,
+                                                          segment.direction, lengthOf(segment), rng,
+                                                          counters.tracking, when);
         if (scatterings == 0) result.transmittance = Rgb(all.transmittance);
         addEscape(result, throughput * all.transmittance, segment.direction, scatterings);
         hit = all.hit;
@@ -82,8 +82,8 @@ class PathIntegrator final : public Integrator {
                                                          counters.tracking, transmittance, when);
         result.transmittance = Rgb(transmittance);
       } else {
-        hit = transport::sampleCollision(m_medium, segment.origin, segment.direction,
-                                         segment.length, rng, counters.tracking, when);
+        hit = transport::sampleCollisionOf(throughput, m_medium, segment.origin, segment.direction,
+                                           segment.length, rng, counters.tracking, when);
       }
       if (m_emission) addEmission(result, throughput, segment, hit, scatterings, rng, when);
       if (!hit.happened()) {
@@ -92,7 +92,7 @@ class PathIntegrator final : public Integrator {
       }
       if (scatterings == 0) {
         const auto begin = static_cast<float>(segment.begin);
-        addDepth(result, throughput, begin + hit.distance,
+        addDepth(result, throughput / hit.share, begin + hit.distance,
                  segment.origin + segment.direction * hit.distance, hit.extinction, when);
       }
       ++counters.scatterings;
@@ -104,7 +104,8 @@ class PathIntegrator final : public Integrator {
       // Where channels differ, light may still pass what stands for a collision.
       if (last && std::is_same_v<Light, float>) return capped(result, throughput, counters);
       if (!last)
-        addNextEvent(result, throughput, p, segment.direction, scatterings, rng, counters, when);
+        addNextEvent(result, throughput / hit.share, p, segment.direction, scatterings, rng,
+                     counters, when);
       const transport::ScatterEvent event =
           transport::scatter(m_medium, p, segment.direction, throughput, rng, when);
       if (!event.survived) return result;
@@ -158,6 +159,7 @@ class PathIntegrator final : public Integrator {
   }
 
   // Distance of what the eye meets first, weighted by what a channel meets there on the mean.
+  // `throughput` is as of collisions at the rate of `extinction`.
   void addDepth(RayRadiance& result, const Rgb& throughput, float distance, const Vec3f& p,
                 float extinction, When when) const {
     float met = 1.0f;
@@ -250,9 +252,9 @@ class PathIntegrator final : public Integrator {
       const Vec3f p = flight.origin + flight.direction * drawn->distance;
       const float extinction = m_medium.extinction(p, when);
       if (!(extinction > 0.0f)) continue;
-      // Collisions are those of the densest channel.
-      const float reached = transport::trackTransmittance<float>(
-          m_medium, flight.origin, flight.direction, drawn->distance, rng, counters.tracking, when);
+      const float reached =
+          transport::trackSurvivalOf(throughput, m_medium, flight.origin, flight.direction,
+                                     drawn->distance, rng, counters.tracking, when);
       if (!(reached > 0.0f)) continue;
       addLamp(result, throughput * (reached * extinction * drawn->weight), *m_sampled[i], p,
               flight.direction, scatterings, rng, counters, when);

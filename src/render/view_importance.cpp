@@ -38,8 +38,8 @@ void tracePath(const Medium& medium, const transport::Segment& ray, const Import
   transport::Segment segment = ray;
   Rgb power(1.0f);
   for (int event = 0; event < kMostScatterings; ++event) {
-    const transport::Collision hit = transport::sampleCollision(
-        medium, segment.origin, segment.direction, segment.length, rng, counters);
+    const transport::Collision hit = transport::sampleCollisionOf(
+        power, medium, segment.origin, segment.direction, segment.length, rng, counters);
     if (event > 0)
       deposit(map, segment.origin, segment.direction, std::min(hit.distance, segment.length),
               static_cast<double>(meanComponent(power)), sums);

@@ -17,6 +17,7 @@ namespace {
 // there is an end to it.
 constexpr double kFewVoxels = 24;  // across the smoke, in the mean of three directions
 constexpr double kThickVoxel = 8, kDeepVoxel = 4;  // optical depths
+constexpr double kOpaqueVoxel = 64;                // the same, where light is lost
 constexpr double kThickShare = 0.2;                // of the smoke's cells
 constexpr double kClumps = 0.4;                    // excess density
 constexpr double kFinestVoxel = 0.5;               // of a density voxel
@@ -24,7 +25,9 @@ constexpr std::uint64_t kMostFineBytes = 256 << 20;
 // Coarser ones where they are many, and as many times those of the smoke: voxels much longer than
 // wide, or smoke that goes far while the shutter is open.
 constexpr double kManyVoxels = 1 << 20, kManyTimes = 16;
-constexpr double kCoarsestVoxel = 64;  // of a density voxel; more would tell next to nothing
+// Of a density voxel of the coarsest volume; more would tell next to nothing.
+constexpr double kCoarsestVoxel = 64;
+constexpr float kAlike = 0.5f;  // extinction of the thinnest channel over that of the densest
 
 double lightVoxelEdge(const FrameSetup& setup) {
   return setup.layout.lightVoxel * setup.medium->voxelEdge();
@@ -40,13 +43,16 @@ bool isDeep(const FrameSetup& setup, double depth) {
 bool coarsenLightVoxels(FrameSetup& setup) {
   double voxels = setup.medium->majorants().cubesInside(lightVoxelEdge(setup));
   if (!(voxels > kManyVoxels)) return false;
-  double own = 0;
-  for (const transport::MediumVolume& volume : setup.medium->volumes())
-    if (volume.densityScale > 0)
-      volume::forEachCell(volume.density, [&own](const Vec3i&, int, float) { ++own; });
+  double own = 0, coarsest = 1;
+  for (const transport::MediumVolume& volume : setup.medium->volumes()) {
+    if (volume.density.empty() || !(volume.densityScale > 0)) continue;
+    volume::forEachCell(volume.density, [&own](const Vec3i&, int, float) { ++own; });
+    coarsest =
+        std::max(coarsest, volume::finestSpacing(volume.localFromNode) / setup.medium->voxelEdge());
+  }
   const double most = std::max(kManyVoxels, kManyTimes * own), usual = setup.layout.lightVoxel;
   double coarser = usual;
-  for (; voxels > most && coarser < kCoarsestVoxel; voxels /= 8)
+  for (; voxels > most && coarser < kCoarsestVoxel * coarsest; voxels /= 8)
     coarser *= 2;
   // Where none would do, too much is asked for, which is refused later.
   if (voxels > most || coarser == usual) return false;
@@ -55,6 +61,7 @@ bool coarsenLightVoxels(FrameSetup& setup) {
       "{}: light is stored in voxels of {} of the smallest edge of a density voxel, as finer ones "
       "are more than {} times as many as those of the smoke (estimator.light_voxel)",
       setup.medium->isMoving() ? "the smoke goes far while the shutter is open"
+      : coarsest >= 2          ? "the voxels of one volume are much finer than those of another"
                                : "the smoke's voxels are much longer than wide",
       coarser, kManyTimes));
   return true;
@@ -106,6 +113,16 @@ void chooseSmoothing(const ParamValues& e, FrameSetup& setup) {
   if (e.text("type") != "photosphere" || e.given("smoothing") || !e.text("cache").empty() ||
       l.holdsPower() || setup.medium->bounds().empty() || !isDeep(setup, kThickVoxel))
     return;
+  // Weights are those of the densest channel: what is seen of the others lies deeper.
+  if (setup.medium->thinnestChannel() < kAlike) {
+    if (isDeep(setup, kOpaqueVoxel))
+      setup.notes.push_back(
+          "the smoke is opaque within each light voxel in its densest channel, and much thinner in "
+          "another: of light scattered many times the densest is left less than there is (0.85 at "
+          "150 mean free paths in a light voxel, 0.6 at 15,000); estimator.type = \"path_traced\" "
+          "or \"light_traced\" has it all");
+    return;
+  }
   l.smoothing = Smoothing::visible;
   setup.notes.push_back(
       fmt::format("the smoke is many mean free paths deep in each light voxel: photons count by "

@@ -138,13 +138,19 @@ void Medium::hashVolume(Hasher& hasher, const MediumVolume& v) const {
 void Medium::findColours() {
   const MediumVolume* first = nullptr;
   bool shared = true;
+  Rgb densest(0.0f);
   for (const MediumVolume& v : m_volumes) {
     if (v.density.empty() || !(v.densityScale > 0)) continue;
     if (!first) first = &v;
     shared = shared && v.tint == first->tint;
+    densest = glm::max(densest, v.tint);
     m_coloured = m_coloured || !photosphere::transport::isGrey(v.tint);
   }
   if (shared) m_tint = first ? first->tint : Rgb(1.0f);
+  // Rarer collisions cost less and tell less each: where a walk would be no more than so many times
+  // as long they are kept.
+  constexpr float kWorthwhile = 0.25f;
+  if (first) m_densest = glm::mix(densest, Rgb(1.0f), glm::greaterThan(densest, Rgb(kWorthwhile)));
   m_grey = m_grey && !m_coloured;
 }
 

@@ -46,6 +46,7 @@ class Batch {
 
  private:
   void flush() {
+    const InterruptShield shield;  // sinks must not throw
     if (!m_flights.empty()) m_sink->consume(m_flights);
     m_flights.clear();
   }
@@ -132,10 +133,12 @@ class Follower {
  private:
   void one(Flight flight, Rng& rng, When when) {
     while (true) {
-      const Collision hit = sampleCollision(m_medium, flight.origin, flight.direction,
-                                            flight.length, rng, m_counters, when);
+      const Collision hit =
+          sampleCollisionOf(flight.power, m_medium, flight.origin, flight.direction, flight.length,
+                            rng, m_counters, when);
       if (hit.happened()) flight.length = hit.distance;
       flight.extinctionAtEnd = hit.extinction;
+      flight.share = hit.share;
       handOn(m_medium, flight, m_batch, when);
       ++m_stats.flights;
       if (!hit.happened()) {

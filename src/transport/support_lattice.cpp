@@ -128,13 +128,29 @@ class Marks {
   std::vector<Mask> m_masks;
 };
 
-void checkTable(const Vec3d& bricks) {
+// @param source  of the lattice, for a message
+void checkTable(const Vec3d& bricks, const std::string& source) {
   const double bytes = 4.0 * bricks.x * bricks.y * bricks.z;
   if (bytes > 4.0 * 1024 * 1024 * 1024)
     throw MemoryError(fmt::format(
-        "a light lattice over {:.0f} x {:.0f} x {:.0f} voxels needs more than 4 GiB for its table; "
-        "raise estimator.light_voxel or remove stray voxels far from the smoke",
-        bricks.x * 8, bricks.y * 8, bricks.z * 8));
+        "a light lattice over {:.6g} x {:.6g} x {:.6g} voxels needs more than 4 GiB for its table"
+        "{}; raise estimator.light_voxel, remove stray voxels far from the smoke, or mend a "
+        "transform that makes voxels small",
+        bricks.x * 8, bricks.y * 8, bricks.z * 8, source));
+}
+
+// The smoke, and the grid of the smallest voxels in it.
+std::string describeSmoke(const Medium& medium) {
+  const Vec3d extent = medium.bounds().extent();
+  std::string text =
+      fmt::format(": the smoke spans {:.4g} x {:.4g} x {:.4g} m", extent.x, extent.y, extent.z);
+  for (const MediumVolume& volume : medium.volumes()) {
+    if (volume.density.empty()) continue;
+    const double edge = volume::finestSpacing(volume.localFromNode);
+    if (edge > medium.voxelEdge() * (1 + 1e-9)) continue;
+    return text + fmt::format(", an edge of the voxels of '{}' {:.4g} m", volume.name, edge);
+  }
+  return text;
 }
 
 void markBox(const Vec3d& low, const Vec3d& high, Marks& marks) {
@@ -189,7 +205,7 @@ SupportLattice::SupportLattice(const Medium& medium, double edge, int margin,
   m_originF = Vec3f(m_origin);
   const Vec3d voxels = glm::ceil(medium.bounds().extent() / edge) + 2.0 * border + 1.0;
   const Vec3d bricks = glm::ceil(voxels / 8.0);
-  checkTable(bricks);
+  checkTable(bricks, describeSmoke(medium));
   m_bricks = Vec3i(bricks);
   Marks marks(m_bricks);
   if (medium.isMoving())
@@ -214,7 +230,7 @@ SupportLattice::SupportLattice(const Vec3d& origin, double edge, const Vec3i& br
       m_originF(Vec3f(origin)),
       m_bricks(bricks),
       m_voxels(active) {
-  checkTable(Vec3d(bricks));
+  checkTable(Vec3d(bricks), " (a light cache's)");
   number();
 }
 

@@ -21,6 +21,7 @@ template <class Light, class When>
 Light marchOpticalDepth(const Medium& medium, const Vec3f& o, const Vec3f& d, float length,
                         float step, When when) {
   using Sum = std::conditional_t<std::is_same_v<Light, float>, double, Vec3d>;
+  throwIfInterrupted();
   const auto extinction = medium.alongRay(o, d, when);
   Sum depth(0.0);
   for (volume::MajorantGrid::Walk walk(medium.majorants(), o, d, 0.0f, length); !walk.done();
@@ -29,7 +30,8 @@ Light marchOpticalDepth(const Medium& medium, const Vec3f& o, const Vec3f& d, fl
     const float begin = walk.begin();
     const float span = walk.end() - begin;
     if (!(span > 0.0f)) continue;
-    const int n = glm::max(1, static_cast<int>(std::ceil(span / step)));
+    const float own = step * medium.majorants().coarseness(walk.cell());
+    const int n = glm::max(1, static_cast<int>(std::ceil(span / own)));
     const float h = span / static_cast<float>(n);
     Light sum(0.0f);
     for (int i = 0; i < n; ++i) {

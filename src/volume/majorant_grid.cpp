@@ -1,5 +1,7 @@
 #include "photosphere/volume/majorant_grid.h"
 
+#include <cmath>
+
 namespace photosphere::volume {
 
 MajorantGrid::MajorantGrid(std::span<const MajorantSource> sources, const WalkedRegion& also,
@@ -28,8 +30,19 @@ MajorantGrid::MajorantGrid(std::span<const MajorantSource> sources, const Walked
   m_values.assign(static_cast<std::size_t>(m_dims.x) * static_cast<std::size_t>(m_dims.y) *
                       static_cast<std::size_t>(m_dims.z),
                   0.0f);
+  const auto octavesOf = [&](const MajorantSource& source) {
+    const double times = finestSpacing(source.localFromNode) / spacing;
+    return static_cast<int>(std::clamp(std::floor(std::log2(times * (1 + 1e-6))), 0.0, 30.0));
+  };
+  const auto holds = [](const MajorantSource& source) {
+    return !source.field->empty() && source.scale > 0;
+  };
+  if (std::any_of(sources.begin(), sources.end(), [&](const MajorantSource& source) {
+        return holds(source) && octavesOf(source) > 0;
+      }))
+    m_octaves.assign(m_values.size(), 30);
   for (const MajorantSource& source : sources)
-    if (!source.field->empty() && source.scale > 0) splat(source);
+    if (holds(source)) splat(source, octavesOf(source));
   m_maximum = *std::max_element(m_values.begin(), m_values.end());
 }
 
@@ -51,7 +64,7 @@ double MajorantGrid::cubesInside(double edge) const {
 
 // Raises every coarse cell that a voxel cell of this source overlaps to the sum of what was there
 // before this source and the source's own maximum over the cell.
-void MajorantGrid::splat(const MajorantSource& source) {
+void MajorantGrid::splat(const MajorantSource& source, int octaves) {
   std::vector<float> own(m_values.size(), 0.0f);
   forEachCell(*source.field, [&](const Vec3i& cell, int edge, float value) {
     const float extinction = static_cast<float>(value * source.scale);
@@ -59,8 +72,11 @@ void MajorantGrid::splat(const MajorantSource& source) {
                       [&](std::size_t coarse) { own[coarse] = std::max(own[coarse], extinction); });
   });
   widen(own, source.reach);
-  for (std::size_t i = 0; i < own.size(); ++i)
+  for (std::size_t i = 0; i < own.size(); ++i) {
     m_values[i] += own[i];
+    if (!m_octaves.empty() && own[i] > 0.0f)
+      m_octaves[i] = std::min(m_octaves[i], static_cast<std::uint8_t>(octaves));
+  }
 }
 
 }  // namespace photosphere::volume

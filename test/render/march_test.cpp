@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 #include <ostream>
 
 #include "support/frames.h"
@@ -199,6 +200,43 @@ TEST(March, TransmittanceDoesNotDependOnTheStep) {
     EXPECT_NEAR(r.transmittance.x, std::exp(-3.0f), 1e-4f) << step;
     EXPECT_NEAR(r.depth / r.opacity, 8 + (1 - 4 * std::exp(-3.0)) / (1.5 * (1 - std::exp(-3.0))),
                 0.05);
+  }
+}
+
+// A sheet and a ball one voxel thick, along rays that cross nodes anywhere: as much smoke on the
+// mean of all offsets of the steps as the finest ones find, whichever way its bounds cut them off.
+TEST(March, FeaturesOfOneVoxelKeepTheirDepth) {
+  constexpr double kVoxel = 2.0 / 32;
+  const auto sheet = [](const Vec3d& p) { return p.z >= 0 && p.z < kVoxel ? 1.0 : 0.0; };
+  const auto ball = [](const Vec3d& p) { return glm::length(p) < 0.9 * kVoxel ? 1.0 : 0.0; };
+  // Something far behind, so that the bounds end elsewhere.
+  const auto beyond = [&](const Vec3d& p) { return glm::length(p + 0.8) < 0.2 ? 1.0 : sheet(p); };
+  const transport::LightList lights;
+  int number = 0;
+  for (const std::function<double(const Vec3d&)>& shape :
+       {std::function<double(const Vec3d&)>(sheet), std::function<double(const Vec3d&)>(ball),
+        std::function<double(const Vec3d&)>(beyond)}) {
+    const transport::Medium medium = makeMedium(sampledVolume(2.0, 32, {0.8, 0.0, 0.5}, shape));
+    const render::Shadows shadows(medium, lights, ShadowMode::march, 0.1f, 0);
+    render::MarchOptions fine;
+    fine.step = 1.0f / 64;
+    const auto usual = render::makeMarchIntegrator(medium, lights, shadows, nullptr, {});
+    const auto exact = render::makeMarchIntegrator(medium, lights, shadows, nullptr, fine);
+    double all = 0, wanted = 0;
+    IntegratorCounters counters;
+    for (int i = 0; i < 8000; ++i) {
+      Rng rng(RandomKey::fromSeed(1, 0), RandomStream::camera, static_cast<std::uint64_t>(i));
+      const Vec3d target(kVoxel * (rng.uniformDouble() - 0.5), kVoxel * (rng.uniformDouble() - 0.5),
+                         0.5 * kVoxel);
+      const Vec3d eye(0.7, 0.4, 2.5);
+      const Vec3f direction(glm::normalize(target - eye));
+      for (const auto* march : {&usual, &exact}) {
+        const RayRadiance r = (*march)->radiance(eye, direction, {}, rng, counters);
+        (march == &usual ? all : wanted) += 1.0 - static_cast<double>(r.transmittance.x);
+      }
+    }
+    EXPECT_NEAR(all / wanted, 1.0, 0.01) << "shape " << number;
+    ++number;
   }
 }
 

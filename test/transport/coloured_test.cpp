@@ -178,5 +178,117 @@ TEST(ColouredExtinction, ChannelsAreThoseOfGreySmoke) {
   }
 }
 
+// Smoke that is a hundred thousand times as dense to blue as to red.
+const Rgb kSteepTint(8e-6f, 3e-3f, 1.0f);
+constexpr double kDensest = 5e5;
+
+// Once blue has ended, nothing keeps red at its pace.
+TEST(ColouredExtinction, TransmittanceTakesNoStepsForChannelsThatHaveEnded) {
+  MediumVolume box = boxVolume(Vec3d(1.0), Vec3i(8), {.extinction = kDensest});
+  box.tint = kSteepTint;
+  const Medium medium = makeMedium(std::move(box));
+  const Vec3f o(-0.5f, 0.01f, 0.02f), d(1, 0, 0);
+  Vec3d sum(0.0);
+  const int count = kSanitized ? 1'000 : 20'000;
+  transport::TrackingCounters counters;
+  for (int i = 0; i < count; ++i) {
+    Rng rng(RandomKey::fromSeed(2, 0), RandomStream::camera, static_cast<std::uint64_t>(i));
+    sum += Vec3d(transport::trackTransmittance<Rgb>(medium, o, d, 1.0f, rng, counters));
+  }
+  for (int c = 0; c < 3; ++c)
+    EXPECT_NEAR(sum[c] / count, std::exp(-kDensest * static_cast<double>(kSteepTint[c])),
+                4 * 0.5 / std::sqrt(count))
+        << "channel " << c;
+  EXPECT_LT(counters.lookups, 5000u * static_cast<unsigned>(count)) << "500,000 at blue's pace";
+  EXPECT_EQ(counters.majorantViolations, 0u);
+}
+
+TEST(ColouredExtinction, SteepChannelsAreThoseOfGreySmoke) {
+  const Rgb albedo(0.9f, 0.95f, 0.99f);
+  transport::LightList lights;
+  lights.push_back(
+      makeLight("directional", {{"position", "[-1, -0.3, 0.4]"}, {"target", "[0, 0, 0]"}}));
+  const Medium coloured = makeMedium(tinted(kSteepTint, kDensest, albedo));
+  const auto path = render::makePathIntegrator(coloured, lights, {});
+  for (int c = 0; c < 3; ++c) {
+    const Medium grey = makeMedium(
+        tinted(Rgb(1.0f), kDensest * static_cast<double>(kSteepTint[c]), Rgb(albedo[c])));
+    const auto alone = render::makePathIntegrator(grey, lights, {});
+    const auto light = [c](const render::RayRadiance& r) {
+      return static_cast<double>(r.total()[c]);
+    };
+    const auto through = [c](const render::RayRadiance& r) {
+      return static_cast<double>(r.transmittance[c]);
+    };
+    const Vec3d eye(0.03, -3, 0.05);
+    constexpr std::size_t samples = 4096;
+    const Estimate a = estimate(*path, eye, Vec3f(0, 1, 0), samples, light);
+    const Estimate b = estimate(*alone, eye, Vec3f(0, 1, 0), samples, light);
+    EXPECT_NEAR(a.mean, b.mean, 4 * std::hypot(a.error, b.error)) << "channel " << c;
+    EXPECT_GT(b.mean, 0.0);
+    const Estimate t = estimate(*path, eye, Vec3f(0, 1, 0), samples, through);
+    const Estimate u = estimate(*alone, eye, Vec3f(0, 1, 0), samples, through);
+    EXPECT_NEAR(t.mean, u.mean, 4 * std::hypot(t.error, u.error)) << "channel " << c;
+  }
+}
+
+// Light in all of the smoke, by the length of flights and by their collisions [W m].
+class Fluence final : public transport::FlightSink {
+ public:
+  explicit Fluence(std::uint64_t photons) : m_photons(photons) {}
+  void consume(std::span<const Flight> flights) override {
+    const std::lock_guard lock(m_mutex);
+    for (const Flight& flight : flights) {
+      byLength += Vec3d(flight.power) * static_cast<double>(flight.length) / m_photons;
+      if (!flight.collided()) continue;
+      collisions += Vec3d(flight.collisionPower()) / m_photons;
+      byCollisions += Vec3d(flight.collisionPower()) /
+                      (static_cast<double>(flight.extinctionAtEnd) * m_photons);
+    }
+  }
+  Vec3d byLength{0.0}, byCollisions{0.0}, collisions{0.0};
+
+ private:
+  double m_photons;
+  std::mutex m_mutex;
+};
+
+TEST(ColouredExtinction, PhotonsOfSteepChannelsAreThoseOfGreySmoke) {
+  const Rgb albedo(0.9f, 0.7f, 0.3f), tint(8e-4f, 0.03f, 1.0f);
+  constexpr double kExtinction = 3e4;
+  transport::LightList lights;
+  lights.push_back(makeLight("directional", {{"position", "[-1, 0, 0]"}, {"target", "[0, 0, 0]"}}));
+  const auto trace = [&](const Medium& medium, transport::TraceStatistics& stats) {
+    transport::TraceOptions options;
+    options.photons = kSanitized ? 1'000 : 40'000;
+    options.key = RandomKey::fromSeed(6, 0);
+    auto sink = std::make_unique<Fluence>(options.photons);
+    stats = transport::tracePhotons(medium, lights, options, *sink);
+    return sink;
+  };
+  transport::TraceStatistics all, one;
+  // Filled to its faces: fluence in empty space would hide what the smoke holds.
+  const auto box = [](const Rgb& t, double extinction, const Rgb& a) {
+    MediumVolume v = boxVolume(Vec3d(1.0), Vec3i(8), {.g = 0.4, .extinction = extinction});
+    v.tint = t;
+    v.albedo = a;
+    return makeMedium(std::move(v));
+  };
+  const auto coloured = trace(box(tint, kExtinction, albedo), all);
+  EXPECT_EQ(all.majorantViolations, 0u);
+  EXPECT_LT(all.flights, 400 * all.photons) << "tens of thousands at blue's pace";
+  for (int c = 0; c < 3; ++c) {
+    const double own = kExtinction * static_cast<double>(tint[c]);
+    const auto grey = trace(box(Rgb(1.0f), own, Rgb(albedo[c])), one);
+    const double bound = (kSanitized ? 0.3 : 0.04) * grey->byLength[c];
+    EXPECT_NEAR(coloured->byLength[c], grey->byLength[c], bound) << "channel " << c;
+    EXPECT_NEAR(coloured->byCollisions[c], grey->byCollisions[c], bound) << "channel " << c;
+    EXPECT_NEAR(all.escaped[c], one.escaped[c], 0.02 * one.emitted[c]) << "channel " << c;
+    // As if each collision were one of the densest channel's.
+    EXPECT_NEAR(coloured->collisions[c], coloured->byCollisions[c] * kExtinction,
+                1e-3 * coloured->collisions[c]);
+  }
+}
+
 }  // namespace
 }  // namespace photosphere::test

@@ -47,8 +47,8 @@ TEST_P(ForcedCollisions, AreWhereTheFirstRealOnesAreOnTheMean) {
   transport::TrackingCounters counters;
   for (int i = 0; i < n; ++i) {
     Rng rng(RandomKey::fromSeed(2, 0), RandomStream::test, static_cast<std::uint64_t>(i));
-    const auto all =
-        transport::forceCollision<float>(medium, kOrigin, kDirection, kLength, rng, counters);
+    const auto all = transport::forceCollision<float>(Rgb(1.0f), medium, kOrigin, kDirection,
+                                                      kLength, rng, counters);
     const transport::Collision one =
         transport::sampleCollision(medium, kOrigin, kDirection, kLength, rng, counters);
     ASSERT_EQ(all.weight > 0.0f, all.hit.happened());
@@ -101,8 +101,8 @@ TEST(ForcedCollision, TransmittanceIsThatOfEachChannel) {
   transport::TrackingCounters counters;
   for (int i = 0; i < n; ++i) {
     Rng rng(RandomKey::fromSeed(4, 0), RandomStream::test, static_cast<std::uint64_t>(i));
-    const auto all =
-        transport::forceCollision<Rgb>(coloured, kOrigin, kDirection, kLength, rng, counters);
+    const auto all = transport::forceCollision<Rgb>(Rgb(1.0f), coloured, kOrigin, kDirection,
+                                                    kLength, rng, counters);
     for (int c = 0; c < 3; ++c)
       channels[c].add(static_cast<double>(all.transmittance[c]));
     weight.add(static_cast<double>(all.weight));
@@ -119,7 +119,7 @@ TEST(ForcedCollision, NothingIsMetWhereThereIsNothing) {
       1.0, 32, {0.9, 0.0, 5.0}, [](const Vec3d& p) { return p.x > 0.2 ? 1.0 : 0.0; }));
   Rng rng(RandomKey::fromSeed(1, 0), RandomStream::test, 0);
   transport::TrackingCounters counters;
-  const auto all = transport::forceCollision<float>(medium, Vec3f(-0.4f, -0.5f, 0.0f),
+  const auto all = transport::forceCollision<float>(Rgb(1.0f), medium, Vec3f(-0.4f, -0.5f, 0.0f),
                                                     Vec3f(0, 1, 0), 1.0f, rng, counters);
   EXPECT_FALSE(all.hit.happened());
   EXPECT_EQ(all.weight, 0.0f);

@@ -106,6 +106,37 @@ TEST(Majorants, AreNeverExceededUnderAnyTransform) {
   }
 }
 
+// A small volume of fine voxels in the corner of a coarse one: steps are fine where it is.
+TEST(Majorants, CoarsenessIsThatOfTheFinestVoxelsInACell) {
+  const auto bricks = volume::bricksFromGrid(volume::Grid(patchyGrid()), 0, "test", false, 0);
+  const volume::MajorantSource coarse{&bricks, Mat4d(1.0), 1.0};
+  Mat4d small(0.11);
+  small[3][3] = 1;
+  const volume::MajorantSource fine{&bricks, small, 1.0};
+  const volume::MajorantGrid alone(std::span(&coarse, 1));
+  for (std::size_t cell = 0; cell < alone.size(); ++cell)
+    ASSERT_EQ(alone.coarseness(cell), 1.0f);
+  const volume::MajorantSource both[] = {coarse, fine};
+  const volume::MajorantGrid majorants(both);
+  const Box3d near = volume::supportBounds(bricks, small);
+  int fines = 0, coarses = 0;
+  for (std::size_t cell = 0; cell < majorants.size(); ++cell) {
+    const Vec3i at(static_cast<int>(cell) % majorants.dims().x,
+                   static_cast<int>(cell) / majorants.dims().x % majorants.dims().y,
+                   static_cast<int>(cell) / (majorants.dims().x * majorants.dims().y));
+    if (!(majorants.majorant(at) > 0.0f)) continue;
+    const float coarseness = majorants.coarseness(cell);
+    ASSERT_TRUE(coarseness == 1.0f || coarseness == 8.0f) << coarseness;  // 9 times as wide
+    (coarseness == 1.0f ? fines : coarses) += 1;
+    const Vec3d low = majorants.bounds().min + Vec3d(at) * Vec3d(majorants.cellSize());
+    if (glm::any(glm::greaterThan(low, near.max + 0.01))) {
+      ASSERT_EQ(coarseness, 8.0f) << cell;
+    }
+  }
+  EXPECT_GT(fines, 0);
+  EXPECT_GT(coarses, fines);
+}
+
 TEST(Majorants, WalkVisitsTheCellsOfARayInOrder) {
   const auto bricks = volume::bricksFromGrid(volume::Grid(patchyGrid()), 0, "test", false, 0);
   const volume::MajorantSource source{&bricks, Mat4d(1.0), 1.0};

@@ -8,7 +8,7 @@ namespace photosphere {
 void installSignalHandlers();
 /// The signal that asked to stop, or 0.
 int pendingSignal();
-/// Throws InterruptedError when a signal asked to stop, unless that is put off.
+/// Throws InterruptedError when a signal asked to stop, unless that is put off. Costs nanoseconds.
 void throwIfInterrupted();
 
 /// While one lives, throwIfInterrupted does not throw: work goes on to a point where what it has
@@ -19,6 +19,15 @@ class InterruptDelay {
   ~InterruptDelay();
   InterruptDelay(const InterruptDelay&) = delete;
   InterruptDelay& operator=(const InterruptDelay&) = delete;
+};
+
+/// The same for its own thread alone: for work from which nothing may be thrown.
+class InterruptShield {
+ public:
+  InterruptShield();
+  ~InterruptShield();
+  InterruptShield(const InterruptShield&) = delete;
+  InterruptShield& operator=(const InterruptShield&) = delete;
 };
 
 }  // namespace photosphere

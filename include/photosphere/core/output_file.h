@@ -44,5 +44,8 @@ std::string describeWriteError(int error);
 
 /// Removes every temporary of this process. Async-signal-safe.
 void removeTemporaries() noexcept;
+/// The same for good, before the process ends: output that begins from now on waits forever.
+/// Async-signal-safe; takes 50 ms.
+void endOutputs() noexcept;
 
 }  // namespace photosphere

@@ -24,6 +24,9 @@ inline constexpr int kMaxPhases = 8;
 /// The smoke as it stands at the frame's own time: what a medium that holds still is asked for.
 struct Still {};
 
+/// Medium::livingShare is no smaller: what collisions that are as much rarer are weighted by fits.
+inline constexpr float kSmallestShare = 0x1p-24f;
+
 /// A time while the shutter is open.
 struct Moment {
   float seconds = 0.0f;  ///< relative to the frame [s]
@@ -149,6 +152,17 @@ class Medium {
   bool isColoured() const { return m_coloured; }
   /// Extinction of each channel over `extinction`, where that is the same everywhere.
   const Rgb* tint() const { return m_tint ? &*m_tint : nullptr; }
+  /// Most that the thinnest channel has of `extinction`, anywhere; past a quarter it counts as 1.
+  float thinnestChannel() const { return std::min({m_densest.x, m_densest.y, m_densest.z}); }
+  /// What the channels that still carry light need of `extinction`, in (0, 1]: none of them is
+  /// extinguished faster than that part of it, anywhere.
+  /// @param power  of each channel, in any unit
+  float livingShare(const Rgb& power) const {
+    float share = kSmallestShare;
+    for (int channel = 0; channel < 3; ++channel)
+      if (power[channel] > 0.0f) share = std::max(share, m_densest[channel]);
+    return share;
+  }
 
   /// Where the smoke that is at `p` then lies at the frame's own time; of several volumes, the mean
   /// by their extinction. Light is stored there, so that it rides with the smoke.
@@ -247,6 +261,7 @@ class Medium {
   std::vector<phase::PhaseFunction> m_phases;
   std::unique_ptr<Emission> m_emission;
   std::optional<Rgb> m_tint;
+  Rgb m_densest{1.0f};  // largest tint of each channel
   Shutter m_shutter;
   double m_displacement = 0.0;
   bool m_moving = false, m_coloured = false;

@@ -25,15 +25,19 @@ inline constexpr std::uint32_t kEmittedBySmoke = ~0u;
 /// time. Local space.
 struct Flight {
   Vec3f origin{0.0f};
-  float length = 0.0f;            ///< inside the medium's bounds [m]
-  Vec3f direction{0.0f};          ///< unit
-  float extinctionAtEnd = 0.0f;   ///< sigma_t at the collision [1/m]; 0 = the photon left
+  float length = 0.0f;    ///< inside the medium's bounds [m]
+  Vec3f direction{0.0f};  ///< unit
+  /// sigma_t at the collision [1/m], Coefficients::extinction; 0 = the photon left
+  float extinctionAtEnd = 0.0f;
   Rgb power{0.0f};                ///< whole power P per photon [W]: divide by the photon count
   std::uint32_t scatterings = 0;  ///< events before this flight; 0 = as its source sent it
   std::uint32_t light = 0;        ///< index of the lamp, or kEmittedBySmoke
   std::uint64_t photon = 0;       ///< index over all photons of the frame
   std::uint32_t ordinal = 0;      ///< number of this flight among the photon's
+  float share = 1.0f;             ///< rate of collisions over sigma_t, Collision::share
   bool collided() const { return extinctionAtEnd > 0.0f; }
+  /// Power of the collision [W], as if collisions came at the rate of sigma_t.
+  Rgb collisionPower() const { return power / share; }
 };
 
 /// Takes flights; called from many threads at once with disjoint batches. Must not throw: the last

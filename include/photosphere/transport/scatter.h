@@ -3,6 +3,7 @@
 
 #include "photosphere/core/rng.h"
 #include "photosphere/transport/medium.h"
+#include "photosphere/transport/roulette.h"
 
 namespace photosphere::transport {
 
@@ -17,8 +18,8 @@ inline Rgb scatteringToward(const Medium& medium, const Coefficients& c, const V
   return sum;
 }
 
-/// Part of the light of a collision that goes toward `wo`: the same over the rate of collisions
-/// [1/sr].
+/// Part of the light of a collision that goes toward `wo`: the same over Coefficients::extinction
+/// [1/sr]. Of rarer collisions, Collision::share is to divide it.
 template <class When = Still>
 inline Rgb phaseAlbedo(const Medium& medium, const Vec3f& p, const Vec3f& wi, const Vec3f& wo,
                        When when = {}) {
@@ -43,10 +44,11 @@ struct ScatterEvent {
 };
 
 /// What becomes of light of some power where each channel has its own chances: at a collision drawn
-/// for the densest channel it passes, scatters or is absorbed. What happens is drawn for the sum of
-/// the channels' powers and each channel weighted by its own chance over that (the balance
-/// heuristic over channels, with all of the path so far; Miller, Georgiev and Jarosz 2019, Kutz et
-/// al. 2017), so the sum never changes and no channel ever passes it.
+/// for the densest channel that carries any it passes, scatters or is absorbed. What happens is
+/// drawn for the sum of the channels' powers and each channel weighted by its own chance over that
+/// (the balance heuristic over channels, with all of the path so far; Miller, Georgiev and Jarosz
+/// 2019, Kutz et al. 2017), so the sum never changes and no channel ever passes it, but for what
+/// roulette gives and takes of channels that are next to dark (rouletteOfFaint).
 /// @param passes  chance of each channel to meet nothing
 /// @param rate    what the scattering coefficients of `c` are divided by: with `passes`, no sum
 ///                above 1 in any channel
@@ -62,6 +64,7 @@ inline ScatterEvent scatterColoured(const Medium& medium, const Coefficients& c,
     event.survived = true;
     event.scattered = false;
     event.weight = passes / pass;
+    event.weight *= rouletteOfFaint(share * event.weight, rng);
     event.direction = wi;
     return event;
   }
@@ -84,14 +87,16 @@ inline ScatterEvent scatterColoured(const Medium& medium, const Coefficients& c,
   return event;
 }
 
-/// Chance of each channel to meet nothing at a collision drawn at the rate of the densest.
-inline Rgb passingChance(const Coefficients& c, const Rgb& channels) {
-  return glm::max(Rgb(0.0f), Rgb(1.0f) - channels / c.extinction);
+/// Chance of each channel to meet nothing at a collision drawn at some rate [1/m], which is no less
+/// than the extinction of any that carries light.
+inline Rgb passingChance(float rate, const Rgb& channels) {
+  return glm::max(Rgb(0.0f), Rgb(1.0f) - channels / rate);
 }
 
 /// Russian roulette with the largest albedo of the channels, so that grey media keep equal weights
 /// and coloured ones bounded weights; then a phase function in proportion to its scattering.
-/// @param power  of the light that arrives, in any unit: acts where extinction is coloured
+/// @param power  of the light that arrives, in any unit: acts where extinction is coloured, where
+///               collisions are those of `sampleCollisionOf`
 template <class When = Still>
 inline ScatterEvent scatter(const Medium& medium, const Vec3f& point, const Vec3f& wi,
                             const Rgb& power, Rng& rng, When when = {}) {
@@ -107,8 +112,8 @@ inline ScatterEvent scatter(const Medium& medium, const Vec3f& point, const Vec3
     if (medium.isColoured()) {
       if (!(c.extinction > 0.0f)) return event;
       const Rgb channels = medium.channels(point, c.extinction, when);
-      return scatterColoured(medium, c, passingChance(c, channels), Rgb(c.extinction), wi, power,
-                             rng);
+      const float rate = c.extinction * medium.livingShare(power);
+      return scatterColoured(medium, c, passingChance(rate, channels), Rgb(rate), wi, power, rng);
     }
     const int count = static_cast<int>(phases.size());
     const Rgb scattering = c.totalScattering(count);

@@ -7,8 +7,10 @@
 #include <type_traits>
 
 #include "photosphere/core/fast_math.h"
+#include "photosphere/core/interrupt.h"
 #include "photosphere/core/rng.h"
 #include "photosphere/transport/medium.h"
+#include "photosphere/transport/roulette.h"
 
 namespace photosphere::transport {
 
@@ -41,13 +43,36 @@ inline float exitDistance(const Medium& medium, const Vec3f& p, const Vec3f& d) 
 struct TrackingCounters {
   std::uint64_t majorantViolations = 0;
   std::uint64_t lookups = 0;
+
+  void looked(unsigned times = 1) {
+    lookups += times;
+    // A few milliseconds of lookups: no ray is so long that a signal goes unheard.
+    if ((lookups & 0xffff) < times) throwIfInterrupted();
+  }
 };
 
 /// A real collision along a ray.
 struct Collision {
   float distance = kInfinity;  ///< [m]; infinite when the ray leaves the medium first
-  float extinction = 0.0f;     ///< sigma_t there [1/m]
+  float extinction = 0.0f;     ///< sigma_t there [1/m], Coefficients::extinction
+  float share = 1.0f;          ///< rate of such collisions over `extinction`
   bool happened() const { return distance < kInfinity; }
+};
+
+/// How many tentative collisions are drawn: as many as the majorants ask for.
+struct Whole {
+  static constexpr float share = 1.0f, density = 1.0f;
+};
+/// More of them: majorants are so many times larger.
+struct Denser {
+  static constexpr float share = 1.0f;
+  float density = 1.0f;
+};
+/// As many as a part of the extinction asks for, which visitors may make smaller on the way: what
+/// is densest no longer matters once its light is gone.
+struct Living {
+  float share = 1.0f;  ///< Medium::livingShare
+  float density = 1.0f;
 };
 
 /// Parts of a distance along a ray below which floats do not tell two places apart.
@@ -74,28 +99,32 @@ inline float extinctionOnward(const Along& extinction, float t, float spacing) {
 /// is walked in parts, each with a majorant of its own: extinction where the part begins, plus what
 /// it can rise by on the way (Medium::steepness). Their number grows with the root of the depth.
 /// @param t          where the walk is, inside the cell
+/// @param whole      majorant of the cell [1/m]
 /// @param steepness  Medium::steepness [1/m]
 /// @param tau        optical depth to the next tentative collision, carried on from part to part
 /// @return false when `visit` did
-template <class Along, class Visit>
-inline bool walkThickCell(const Along& extinction, float t, float end, float majorant,
-                          float steepness, float& tau, Rng& rng, TrackingCounters& counters,
-                          const Visit& visit) {
+template <class Along, class Visit, class Draw>
+inline bool walkThickCell(const Along& extinction, float t, float end, float whole, float steepness,
+                          float& tau, Rng& rng, TrackingCounters& counters, const Visit& visit,
+                          const Draw& draw) {
   constexpr float kPartDepth = 2.0f;    // of a part that begins in thin smoke
   constexpr float kWholeDepth = 16.0f;  // of one near the cell's own majorant
-  const float slope = majorant * steepness, spacing = 1.0f / steepness;
+  const float spacing = 1.0f / steepness;
   while (t < end) {
-    const float sigma = extinctionOnward(extinction, t, spacing);
-    counters.lookups += 2;
+    const float share = draw.share, rate = share * draw.density;
+    const float majorant = whole * rate, slope = majorant * steepness;
+    const float sigma = extinctionOnward(extinction, t, spacing) * rate;
+    counters.looked(2);
     float part = kWholeDepth / majorant, bound = majorant;
     if (sigma < 0.25f * majorant) {
       part = glm::max(thinPart(sigma, slope, kPartDepth), kDistanceResolution * t);
       // Faces are steeper than that: one that lies within the part shows at its end.
-      bound = glm::max(sigma + slope * part, extinctionOnward(extinction, t + part, spacing));
+      bound =
+          glm::max(sigma + slope * part, extinctionOnward(extinction, t + part, spacing) * rate);
       bound = glm::min(majorant, bound * 1.0001f);
-      counters.lookups += 2;
+      counters.looked(2);
     }
-    const float stop = glm::min(end, t + glm::max(part, kDistanceResolution * t));
+    float stop = glm::min(end, t + glm::max(part, kDistanceResolution * t));
     while (true) {
       const float available = (stop - t) * bound;
       if (!(tau < available)) {
@@ -104,10 +133,14 @@ inline bool walkThickCell(const Along& extinction, float t, float end, float maj
       }
       t += tau / bound;
       const float here = extinction(t);
-      ++counters.lookups;
-      if (here > bound * 1.001f) ++counters.majorantViolations;
+      counters.looked();
+      if (here * share > bound * 1.001f) ++counters.majorantViolations;
       if (!visit(t, here, bound)) return false;
       tau = -fastLog(rng.uniformPositive());
+      if (draw.share != share) {
+        stop = t;
+        break;
+      }
     }
     t = stop;
   }
@@ -119,24 +152,25 @@ inline constexpr float kThickVoxel = 16.0f;
 
 /// Calls visit(distance, sigma_t, majorant) for the tentative collisions of a ray, drawn against
 /// the local majorants in order, until it returns false: the walk that delta and ratio tracking
-/// share.
-/// @param density  1, or more to draw that many times as many: majorants are so much larger
-template <class Visit, class When = Still>
+/// share. The majorant is the rate at which they are drawn there: that of the cell, times share
+/// and density.
+/// @param draw  Whole, Denser or Living
+template <class Visit, class When = Still, class Draw = Whole>
 inline void forEachTentative(const Medium& medium, const Vec3f& o, const Vec3f& d, float length,
                              Rng& rng, TrackingCounters& counters, const Visit& visit,
-                             When when = {}, float density = 1.0f) {
+                             When when = {}, const Draw& draw = {}) {
   const auto extinction = medium.alongRay(o, d, when);
   const float thick = kThickVoxel * medium.steepness();
   float tau = -fastLog(rng.uniformPositive());
   for (volume::MajorantGrid::Walk walk(medium.majorants(), o, d, 0.0f, length); !walk.done();
        walk.advance()) {
-    const float majorant = walk.majorant() * density;
+    float majorant = walk.majorant() * (draw.share * draw.density);
     const float end = walk.end();
     float t = walk.begin();
     if constexpr (std::is_same_v<When, Still>)
       if (majorant > thick) {
-        if (!walkThickCell(extinction, t, end, majorant, medium.steepness(), tau, rng, counters,
-                           visit))
+        if (!walkThickCell(extinction, t, end, walk.majorant(), medium.steepness(), tau, rng,
+                           counters, visit, draw))
           return;
         continue;
       }
@@ -148,10 +182,12 @@ inline void forEachTentative(const Medium& medium, const Vec3f& o, const Vec3f& 
       }
       t += tau / majorant;
       const float sigma = extinction(t);
-      ++counters.lookups;
-      if (sigma > majorant * 1.001f) ++counters.majorantViolations;
+      counters.looked();
+      if (sigma * draw.share > majorant * 1.001f) ++counters.majorantViolations;
       if (!visit(t, sigma, majorant)) return;
       tau = -fastLog(rng.uniformPositive());
+      if constexpr (std::is_same_v<Draw, Living>)
+        majorant = walk.majorant() * (draw.share * draw.density);
     }
   }
 }
@@ -175,14 +211,6 @@ inline Light extinctionAs(const Medium& medium, const Vec3f& p, float sigma, Whe
     return medium.channels(p, sigma, when);
 }
 
-/// Roulette over light of which less than a tenth is left: its factor, which is 0 where the ray
-/// ends dark and whose mean is 1. Survival is in proportion to what is left.
-inline constexpr float kRouletteFrom = 0.1f;
-inline float roulette(float left, Rng& rng) {
-  if (!(left < kRouletteFrom)) return 1.0f;
-  return left > 1e-30f && rng.uniform() * kRouletteFrom < left ? kRouletteFrom / left : 0.0f;
-}
-
 /// The factor of one tentative collision in a ratio-tracked transmittance, with roulette once that
 /// is small.
 /// @tparam Light  float, or Rgb where the channels differ
@@ -190,26 +218,49 @@ inline float roulette(float left, Rng& rng) {
 template <class Light>
 inline bool attenuate(Light& transmittance, const Light& sigma, float majorant, Rng& rng) {
   transmittance *= glm::max(Light(0.0f), Light(1.0f) - sigma / majorant);
+  if constexpr (std::is_same_v<Light, Rgb>) transmittance *= rouletteOfFaint(transmittance, rng);
   const float factor = roulette(largestOf(transmittance), rng);
   transmittance *= factor;
   return factor > 0.0f;
 }
 
+/// How many tentative collisions a transmittance takes: as its channels need.
+template <class Light>
+using DrawFor = std::conditional_t<std::is_same_v<Light, float>, Whole, Living>;
+
+/// What is left to draw once some channels may have ended.
+inline void slowDown(Whole&, const Medium&, float) {}
+inline void slowDown(Living& draw, const Medium& medium, const Rgb& left) {
+  draw.share = glm::min(draw.share, medium.livingShare(left));
+}
+
 /// The first real collision (Woodcock delta tracking over local majorants). Where channels differ,
 /// it is one of the densest: `scatter` then decides what it is for the light that arrives.
-template <class When = Still>
+/// @param draw  Whole, or Living for the densest of the channels that carry light
+template <class When = Still, class Draw = Whole>
 inline Collision sampleCollision(const Medium& medium, const Vec3f& o, const Vec3f& d, float length,
-                                 Rng& rng, TrackingCounters& counters, When when = {}) {
+                                 Rng& rng, TrackingCounters& counters, When when = {},
+                                 const Draw& draw = {}) {
   Collision hit;
   forEachTentative(
       medium, o, d, length, rng, counters,
       [&](float t, float sigma, float majorant) {
-        const bool real = rng.uniform() * majorant < sigma;
-        if (real) hit = {t, sigma};
+        const bool real = rng.uniform() * majorant < sigma * draw.share;
+        if (real) hit = {t, sigma, draw.share};
         return !real;
       },
-      when);
+      when, draw);
   return hit;
+}
+
+/// The same for light of some power: where channels differ, one of the densest that carries any.
+template <class When = Still>
+inline Collision sampleCollisionOf(const Rgb& power, const Medium& medium, const Vec3f& o,
+                                   const Vec3f& d, float length, Rng& rng,
+                                   TrackingCounters& counters, When when = {}) {
+  if (!medium.isColoured()) return sampleCollision(medium, o, d, length, rng, counters, when);
+  return sampleCollision(medium, o, d, length, rng, counters, when,
+                         Living{medium.livingShare(power)});
 }
 
 /// Unbiased transmittance along a ray (ratio tracking, Novak et al. 2014).
@@ -218,14 +269,34 @@ template <class Light = float, class When = Still>
 inline Light trackTransmittance(const Medium& medium, const Vec3f& o, const Vec3f& d, float length,
                                 Rng& rng, TrackingCounters& counters, When when = {}) {
   Light transmittance(1.0f);
+  DrawFor<Light> draw;
   forEachTentative(
       medium, o, d, length, rng, counters,
       [&](float t, float sigma, float majorant) {
         const Light own = extinctionAs<Light>(medium, o + d * t, sigma, when);
-        return attenuate(transmittance, own, majorant, rng);
+        const bool goesOn = attenuate(transmittance, own, majorant, rng);
+        slowDown(draw, medium, transmittance);
+        return goesOn;
       },
-      when);
+      when, draw);
   return transmittance;
+}
+
+/// The part of a ray's light that meets no collision as `sampleCollisionOf` draws them, unbiased.
+template <class When = Still>
+inline float trackSurvivalOf(const Rgb& power, const Medium& medium, const Vec3f& o, const Vec3f& d,
+                             float length, Rng& rng, TrackingCounters& counters, When when = {}) {
+  if (!medium.isColoured())
+    return trackTransmittance<float>(medium, o, d, length, rng, counters, when);
+  float survival = 1.0f;
+  const Living draw{medium.livingShare(power)};
+  forEachTentative(
+      medium, o, d, length, rng, counters,
+      [&](float, float sigma, float majorant) {
+        return attenuate(survival, sigma * draw.share, majorant, rng);
+      },
+      when, draw);
+  return survival;
 }
 
 /// The first real collision and, from the same tentative ones, the transmittance of the whole ray:
@@ -237,15 +308,18 @@ inline Collision sampleCollisionAndTransmittance(const Medium& medium, const Vec
                                                  When when = {}) {
   Collision first;
   transmittance = Light(1.0f);
+  DrawFor<Light> draw;
   forEachTentative(
       medium, o, d, length, rng, counters,
       [&](float t, float sigma, float majorant) {
         if (!first.happened() && rng.uniform() * majorant < sigma) first = {t, sigma};
         const Light own = extinctionAs<Light>(medium, o + d * t, sigma, when);
         // A ray that has ended dark walks on only until it has its collision.
-        return attenuate(transmittance, own, majorant, rng) || !first.happened();
+        const bool goesOn = attenuate(transmittance, own, majorant, rng);
+        if (first.happened()) slowDown(draw, medium, transmittance);
+        return goesOn || !first.happened();
       },
-      when);
+      when, draw);
   return first;
 }
 
@@ -272,24 +346,32 @@ struct ForcedCollision {
 /// is none. Where channels do not differ, weight and transmittance add up to 1. In thin smoke, of
 /// which most rays would meet nothing, more tentative collisions are drawn than the majorants ask
 /// for.
+/// @param power  of the light, in any unit: channels without any have no part in it
 template <class Light, class When = Still>
-inline ForcedCollision<Light> forceCollision(const Medium& medium, const Vec3f& o, const Vec3f& d,
-                                             float length, Rng& rng, TrackingCounters& counters,
-                                             When when = {}) {
+inline ForcedCollision<Light> forceCollision(const Rgb& power, const Medium& medium, const Vec3f& o,
+                                             const Vec3f& d, float length, Rng& rng,
+                                             TrackingCounters& counters, When when = {}) {
   constexpr float kTentative = 8.0f;  // on the mean, at least
   ForcedCollision<Light> forced;
-  const float depth = majorantDepth(medium, o, d, length);
+  std::conditional_t<std::is_same_v<Light, float>, Denser, Living> draw;
+  if constexpr (std::is_same_v<Light, Rgb>) {
+    draw.share = medium.livingShare(power);
+    forced.transmittance = glm::mix(Rgb(0.0f), Rgb(1.0f), glm::greaterThan(power, Rgb(0.0f)));
+  }
+  const float depth = majorantDepth(medium, o, d, length) * draw.share;
   if (!(depth > 0.0f)) return forced;
+  draw.density = glm::clamp(kTentative / depth, 1.0f, 1e30f);
   float left = 1.0f;  // of the densest channel
   bool dark = false;
   forEachTentative(
       medium, o, d, length, rng, counters,
       [&](float t, float sigma, float majorant) {
         // Of what is left a part collides; of little all or nothing, so that the sum stays 1.
-        float first = left * glm::min(1.0f, sigma / majorant);
-        if (left < kRouletteFrom) first = rng.uniform() * majorant < sigma ? left : 0.0f;
+        const float rate = sigma * draw.share;
+        float first = left * glm::min(1.0f, rate / majorant);
+        if (left < kRouletteFrom) first = rng.uniform() * majorant < rate ? left : 0.0f;
         forced.weight += first;
-        if (rng.uniform() * forced.weight < first) forced.hit = {t, sigma};
+        if (rng.uniform() * forced.weight < first) forced.hit = {t, sigma, draw.share};
         left -= first;
         if constexpr (std::is_same_v<Light, float>) {
           forced.transmittance = left;
@@ -298,10 +380,11 @@ inline ForcedCollision<Light> forceCollision(const Medium& medium, const Vec3f& 
           if (!dark)
             dark = !attenuate(forced.transmittance, medium.channels(o + d * t, sigma, when),
                               majorant, rng);
+          if (!(left > 0.0f)) slowDown(draw, medium, forced.transmittance);
           return left > 0.0f || !dark;
         }
       },
-      when, glm::clamp(kTentative / depth, 1.0f, 1e30f));
+      when, draw);
   return forced;
 }
 
@@ -324,7 +407,7 @@ inline Rgb sampleEmission(const Medium& medium, const Emission& emission, const 
 
 /// Optical depth along a ray by the midpoint rule.
 /// @tparam Light  float, or Rgb where the channels differ
-/// @param step    [m]
+/// @param step    in the finest voxels of the medium [m]; longer where all are coarser
 template <class Light = float, class When = Still>
 Light marchOpticalDepth(const Medium& medium, const Vec3f& o, const Vec3f& d, float length,
                         float step, When when = {});

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <span>
 #include <vector>
@@ -54,12 +55,17 @@ class MajorantGrid {
   std::size_t size() const { return m_values.size(); }
   /// Largest majorant [1/m].
   float maximum() const { return m_maximum; }
+  /// How many times as wide as the finest source's the voxels of the sources in a cell are, in
+  /// whole powers of two: where all are much coarser, steps may be. @param cell  counted from 0
+  float coarseness(std::size_t cell) const {
+    return m_octaves.empty() ? 1.0f : static_cast<float>(1u << m_octaves[cell]);
+  }
   /// Share of the cells that are not empty whose majorant is more than `extinction` [0, 1].
   double shareAbove(float extinction) const;
   /// About how many cubes of that edge fill the cells that are not empty, where smoke is or may
   /// come. @param edge  [m]
   double cubesInside(double edge) const;
-  std::uint64_t memoryBytes() const { return m_values.size() * sizeof(float); }
+  std::uint64_t memoryBytes() const { return m_values.size() * sizeof(float) + m_octaves.size(); }
 
   /// Walks the cells along a ray in order.
   class Walk {
@@ -157,12 +163,13 @@ class MajorantGrid {
                static_cast<std::size_t>(m_dims.x) +
            static_cast<std::size_t>(c.x);
   }
-  void splat(const MajorantSource& source);
+  void splat(const MajorantSource& source, int octaves);
 
   Box3d m_bounds;
   Vec3f m_origin{0.0f}, m_cellSize{1.0f}, m_inverseCellSize{1.0f};
   Vec3i m_dims{0};
   std::vector<float> m_values;
+  std::vector<std::uint8_t> m_octaves;  // of coarseness; none where the voxels of all are alike
   float m_maximum = 0.0f;
 };
 
