@@ -2,10 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <sys/stat.h>
+
+#include <algorithm>
 #include <filesystem>
 
 #include "photosphere/core/error.h"
 #include "photosphere/core/frames.h"
+#include "photosphere/core/hash.h"
 
 namespace photosphere::cli {
 
@@ -72,6 +76,21 @@ void JobFiles::writes(const std::string& role, const std::string& path, const Fr
   if (!hasFrameToken(path)) return writes(role, path);
   for (const std::int64_t frame : frames)
     writes(role, framePath(path, frame));
+}
+
+std::string JobFiles::stamp(const std::string& except) const {
+  std::vector<std::string> files;
+  for (const auto& [file, use] : m_uses)
+    if (!use.written && use.role != except) files.push_back(file);
+  std::sort(files.begin(), files.end());
+  Hasher hasher;
+  for (const std::string& file : files) {
+    struct stat found = {};
+    const bool exists = stat(file.c_str(), &found) == 0;
+    hasher.text(fmt::format("{} {} {} {} {}\n", file, exists, found.st_size, found.st_mtim.tv_sec,
+                            found.st_mtim.tv_nsec));
+  }
+  return hasher.hex();
 }
 
 }  // namespace photosphere::cli

@@ -24,6 +24,9 @@ class JobFiles {
   void reads(const std::string& role, const std::string& path, const Frames& frames);
   void writes(const std::string& role, const std::string& path, const Frames& frames);
 
+  /// Hash of what is read, by name, size and time of the last change, of all roles but one.
+  std::string stamp(const std::string& except) const;
+
  private:
   struct Use {
     std::string role;

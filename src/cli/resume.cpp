@@ -21,21 +21,6 @@ Resume parseWhen(const std::string& when) {
   return when == "require" ? Resume::require : Resume::automatic;
 }
 
-// Frames of one line of a note; none where it cannot be read.
-std::vector<std::int64_t> framesOf(const std::string& line) {
-  if (line.empty()) return {};
-  try {
-    return parseFrames(line);
-  } catch (const ConfigError&) {
-    return {};
-  }
-}
-
-std::string lineOf(const std::set<std::int64_t>& frames) {
-  if (frames.empty()) return {};
-  return formatFrames(std::vector<std::int64_t>(frames.begin(), frames.end()));
-}
-
 }  // namespace
 
 void addResumeOptions(CLI::App& app, ResumeOptions& options) {
@@ -54,12 +39,14 @@ void addResumeOptions(CLI::App& app, ResumeOptions& options) {
 }
 
 ResumableJob::ResumableJob(const ResumeOptions& options, std::string identity,
-                           const std::vector<std::int64_t>& frames, OutputOf outputOf)
+                           const std::vector<std::int64_t>& frames, OfFrame outputOf,
+                           OfFrame inputsOf)
     : m_options(options),
       m_when(parseWhen(options.when)),
       m_identity(std::move(identity)),
       m_frames(frames),
-      m_outputOf(std::move(outputOf)) {
+      m_outputOf(std::move(outputOf)),
+      m_inputsOf(std::move(inputsOf)) {
   if (m_when == Resume::never) return;
   bool any = false;
   for (const std::int64_t frame : frames) {
@@ -73,35 +60,45 @@ ResumableJob::ResumableJob(const ResumeOptions& options, std::string identity,
     throw InputMissingError(
         Checkpoint::folderOf(m_outputOf(frames.empty() ? 1 : frames.front())).string(),
         "there is no checkpoint to go on from; leave --resume require out to start anew");
-  m_finished = m_earlier;
 }
 
-// The job, its finished frames, and those of them that missed their target: a line each.
+// The job, then a line for each finished frame: what it was made from, and whether it missed its
+// target.
 std::string ResumableJob::note() const {
-  return m_identity + '\n' + lineOf(m_finished) + '\n' + lineOf(m_missed);
+  std::string text = m_identity + '\n';
+  for (const auto& [frame, inputs] : m_finished)
+    text += fmt::format("{} {} {}\n", frame, inputs, m_missed.count(frame));
+  return text;
 }
 
 void ResumableJob::readNote(const std::string& note) {
   std::istringstream lines(note);
-  std::string identity, done, missed;
+  std::string identity, inputs;
   std::getline(lines, identity);
   if (identity != m_identity) return;
-  std::getline(lines, done);
-  std::getline(lines, missed);
-  for (const std::int64_t frame : framesOf(done))
+  std::int64_t frame = 0;
+  int missed = 0;
+  while (lines >> frame >> inputs >> missed) {
+    if (std::find(m_frames.begin(), m_frames.end(), frame) == m_frames.end()) continue;
+    if (inputs != m_inputsOf(frame)) {
+      log::info("frame {}: what it is made from has changed since the interruption", frame);
+      continue;
+    }
     m_earlier.insert(frame);
-  for (const std::int64_t frame : framesOf(missed))
-    m_missed.insert(frame);
+    m_finished[frame] = inputs;
+    if (missed) m_missed.insert(frame);
+  }
 }
 
 Checkpoint& ResumableJob::begin(std::int64_t frame) {
+  m_inputs = m_inputsOf(frame);
   m_current.emplace(Checkpoint::folderOf(m_outputOf(frame)), m_options.interval, m_when);
   if (!m_finished.empty()) m_current->noteAlong(note());
   return *m_current;
 }
 
 void ResumableJob::finished(std::int64_t frame, bool missed) {
-  m_finished.insert(frame);
+  m_finished[frame] = m_inputs;
   if (missed) m_missed.insert(frame);
   if (m_current) m_current->discard();
   m_current.reset();

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <optional>
 #include <set>
 #include <string>
@@ -27,15 +28,18 @@ void addResumeOptions(CLI::App& app, ResumeOptions& options);
 /// frames the job had finished, so that the same command goes on where it was stopped.
 class ResumableJob {
  public:
-  using OutputOf = std::function<std::string(std::int64_t)>;
+  using OfFrame = std::function<std::string(std::int64_t)>;
 
   /// @param identity  of the job: scene and options, on one line; finished frames of another job
   ///                  are made again
+  /// @param inputsOf  says what a frame is made from, in one word: where that is no longer the
+  ///                  same, a finished frame is made again
   /// @throws InputMissingError (require) when no output of these frames has a checkpoint
   ResumableJob(const ResumeOptions& options, std::string identity,
-               const std::vector<std::int64_t>& frames, OutputOf outputOf);
+               const std::vector<std::int64_t>& frames, OfFrame outputOf, OfFrame inputsOf);
 
-  /// True when the interrupted run had finished this frame; its file must still be looked at.
+  /// True when the interrupted run had finished this frame, from what it would be made from now;
+  /// its file must still be looked at.
   bool hadFinished(std::int64_t frame) const { return m_earlier.count(frame) != 0; }
   /// Begins a frame. The checkpoint is the job's.
   Checkpoint& begin(std::int64_t frame);
@@ -56,8 +60,10 @@ class ResumableJob {
   Resume m_when;
   std::string m_identity;
   std::vector<std::int64_t> m_frames;
-  OutputOf m_outputOf;
-  std::set<std::int64_t> m_earlier, m_finished, m_missed;
+  OfFrame m_outputOf, m_inputsOf;
+  std::set<std::int64_t> m_earlier, m_missed;
+  std::map<std::int64_t, std::string> m_finished;  // and what they were made from
+  std::string m_inputs;                            // of the frame under way
   std::optional<Checkpoint> m_current;
 };
 

@@ -9,6 +9,7 @@
 #include "frame_loop.h"
 #include "number_check.h"
 #include "photosphere/core/error.h"
+#include "photosphere/core/hash.h"
 #include "photosphere/core/log.h"
 #include "photosphere/core/resources.h"
 #include "photosphere/core/version.h"
@@ -74,6 +75,7 @@ void addPlanOptions(CLI::App& app, SceneOptions& options) {
                "scene as zero [exit 4]");
   app.add_option("--cache-offset", options.cacheOffset,
                  "Frame of the caches minus frame of the picture [0]")
+      ->check(frameNumber())
       ->type_name("N")
       ->group("Frames");
   std::vector<std::string> names;
@@ -141,6 +143,12 @@ bool CacheFrames::map(std::int64_t frame, std::int64_t& cacheFrame) const {
   return !m_hold || mapFrame(cacheFrame, m_first, m_last, *m_hold, cacheFrame);
 }
 
+namespace {
+
+constexpr const char* kSceneRole = "the scene";
+
+}  // namespace
+
 JobFiles filesRead(const scene::SceneFile& scene, const std::vector<std::int64_t>& frames,
                    const CacheFrames& cacheFrames) {
   std::vector<std::int64_t> ofCaches;
@@ -148,7 +156,7 @@ JobFiles filesRead(const scene::SceneFile& scene, const std::vector<std::int64_t
   for (const std::int64_t frame : frames)
     if (cacheFrames.map(frame, cacheFrame)) ofCaches.push_back(cacheFrame);
   JobFiles files;
-  files.reads("the scene", scene.path);
+  files.reads(kSceneRole, scene.path);
   for (std::size_t i = 0; i < scene.volumes.size(); ++i)
     files.reads(fmt::format("volume.{}.file", i),
                 scene.resolvePath(scene.volumes[i].values.text("file")), ofCaches);
@@ -164,12 +172,18 @@ JobFiles filesRead(const scene::SceneFile& scene, const std::vector<std::int64_t
 
 ResumableJob resumableJob(const scene::SceneFile& scene, const SceneOptions& options,
                           const std::string& more, const std::vector<std::int64_t>& frames,
-                          const std::string& output) {
-  const std::string identity =
-      fmt::format("{} {} {} {} {} {}", buildText(), scene.hash(), options.cacheOffset,
-                  options.cacheHold, options.allowStale, more);
-  return {options.resume, identity, frames,
-          [output](std::int64_t frame) { return framePath(output, frame); }};
+                          const CacheFrames& cacheFrames, const std::string& output) {
+  // All that the scene says, of the output as well.
+  Hasher job;
+  job.text(scene::dumpScene(scene));
+  job.text(fmt::format("{} {} {} {} {}", options.cacheOffset, options.cacheHold, options.allowStale,
+                       options.stats, more));
+  return {options.resume, fmt::format("{} {}", buildText(), job.hex()), frames,
+          [output](std::int64_t frame) { return framePath(output, frame); },
+          // A scene that was written anew says the same: that counts, and not its file.
+          [&scene, cacheFrames](std::int64_t frame) {
+            return filesRead(scene, {frame}, cacheFrames).stamp(kSceneRole);
+          }};
 }
 
 void printPlan(const scene::SceneFile& scene, std::int64_t frame,

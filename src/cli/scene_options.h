@@ -62,7 +62,7 @@ JobFiles filesRead(const scene::SceneFile& scene, const std::vector<std::int64_t
 /// The job that makes these frames. @param more  what decides its outputs beside the scene
 ResumableJob resumableJob(const scene::SceneFile& scene, const SceneOptions& options,
                           const std::string& more, const std::vector<std::int64_t>& frames,
-                          const std::string& output);
+                          const CacheFrames& cacheFrames, const std::string& output);
 
 /// What --dry-run prints of the first frame: what would be simulated, and the memory for it.
 /// @throws what scene::setUpFrame throws

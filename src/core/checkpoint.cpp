@@ -6,6 +6,7 @@
 #include <cerrno>
 #include <cstring>
 #include <utility>
+#include <vector>
 
 #include "photosphere/core/checksums.h"
 #include "photosphere/core/error.h"
@@ -108,6 +109,20 @@ std::optional<StateReader> openSealed(const fs::path& path) {
   return StateReader(path, std::move(in), size);
 }
 
+// Whether a file is one that `writeSealed` wrote, or began to.
+bool isOurs(const fs::path& path) {
+  std::error_code error;
+  if (!fs::is_regular_file(fs::symlink_status(path, error))) return false;
+  if (path.filename().string().starts_with('.'))
+    return path.filename().string().find(".tmp-photosphere-") != std::string::npos;
+  std::ifstream in(path, std::ios::binary);
+  std::string magic(kMagic.size(), '\0');
+  in.read(magic.data(), static_cast<std::streamsize>(magic.size()));
+  // One that was cut off within its magic, or that the disk lost, is empty or zeros.
+  const std::string_view read(magic.data(), static_cast<std::size_t>(in.gcount()));
+  return kMagic.starts_with(read) || read.find_first_not_of('\0') == std::string_view::npos;
+}
+
 }  // namespace
 
 void StateReader::fail() const {
@@ -149,10 +164,11 @@ void Checkpoint::identify(const std::string& work) {
   m_work = work;
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(m_folder, error)) {
-    if (entry.path().filename() == kNoteFile) continue;
+    if (entry.path().filename() == kNoteFile || !entry.is_regular_file(error)) continue;
+    const bool ours = isOurs(entry.path());
     // Left by a run that was killed while it wrote.
     if (entry.path().filename().string().starts_with('.')) {
-      fs::remove(entry.path(), error);
+      if (ours) fs::remove(entry.path(), error);
       continue;
     }
     std::optional<StateReader> kept = openSealed(entry.path());
@@ -166,7 +182,7 @@ void Checkpoint::identify(const std::string& work) {
     if (m_resume == Resume::require)
       throw InputError(entry.path().string(), why + "; use --resume never to start anew");
     log::warning("{} {}: not gone on from", entry.path().string(), why);
-    fs::remove(entry.path(), error);
+    if (ours) fs::remove(entry.path(), error);
   }
 }
 
@@ -191,7 +207,7 @@ void Checkpoint::save(const std::string& part, const WriteState& write) {
   } catch (const OutputError& error) {
     if (!std::exchange(m_warned, true)) log::warning("no checkpoint: {}", error.what());
     std::error_code ignored;
-    fs::remove(m_folder, ignored);  // an empty folder is no checkpoint
+    if (exists()) fs::remove(m_folder, ignored);  // an empty folder is no checkpoint
   }
   m_last = Clock::now();
   m_saveSeconds = std::chrono::duration<double>(m_last - start).count();
@@ -216,8 +232,14 @@ bool Checkpoint::exists() const {
 }
 
 void Checkpoint::discard() {
-  std::error_code ignored;
-  fs::remove_all(m_folder, ignored);
+  std::error_code error;
+  std::vector<fs::path> ours;
+  for (const auto& entry : fs::directory_iterator(m_folder, error))
+    if (isOurs(entry.path())) ours.push_back(entry.path());
+  for (const fs::path& path : ours)
+    fs::remove(path, error);
+  // What somebody else keeps there stays.
+  if (exists()) fs::remove(m_folder, error);
 }
 
 }  // namespace photosphere

@@ -439,6 +439,29 @@ TEST_F(Interrupted, FinishedFramesAreNotMadeAgain) {
   EXPECT_NE(fs::last_write_time(m_folder / "x.0001.exr"), written);
 }
 
+// Nor those that would no longer be the same.
+TEST_F(Interrupted, FinishedFramesOfWhatHasChangedAreMadeAgain) {
+  const std::string job =
+      "render scene.toml -o x.####.exr --float --frames 1-3 -s estimator.type=path_traced -s "
+      "estimator.samples=400";
+  const auto madeAgain = [&](const std::string& more) {
+    const RunResult result =
+        runShell(std::string(PHOTOSPHERE_TOOL) + " " + job + more, m_folder.path());
+    EXPECT_EQ(result.exitCode, 0) << result.err;
+    return result.out.find("x.0001.exr was finished before") == std::string::npos;
+  };
+  for (const char* more :
+       {" -s 'output.aovs=[\"beauty\",\"single\"]'", " --preview p.####.png", " --stats s.json"}) {
+    fs::remove(m_folder / "x.0001.exr");
+    ASSERT_EQ(signalAt(job, "x.0001.exr").exitCode, 75);
+    EXPECT_TRUE(madeAgain(more)) << more;
+  }
+  fs::remove(m_folder / "x.0001.exr");
+  ASSERT_EQ(signalAt(job, "x.0001.exr").exitCode, 75);
+  volume::writeVdb(m_folder / "smoke.0001.vdb", {ballOfSmoke(0.2)});
+  EXPECT_TRUE(madeAgain("")) << "other smoke";
+}
+
 TEST_F(Interrupted, FiguresThatWereDamagedMeanwhileAreMissed) {
   const std::string job =
       "render scene.toml -o x.####.exr --stats s.json --float --frames 1-2 -s "

@@ -103,6 +103,22 @@ TEST_F(CheckpointTest, ANoteIsKeptWithTheFirstPart) {
 TEST_F(CheckpointTest, AFolderThatCannotBeWrittenIsAWarning) {
   writeText(m_folder / "out.exr.checkpoint", "a file");
   EXPECT_NO_THROW(begin().save("frame", number(7)));
+  begin().discard();
+  EXPECT_EQ(readText(m_folder / "out.exr.checkpoint"), "a file");
+}
+
+TEST_F(CheckpointTest, WhatOthersKeepThereStays) {
+  const fs::path folder = m_folder / "out.exr.checkpoint";
+  fs::create_directories(folder / "takes");
+  writeText(folder / "notes.txt", "mine");
+  writeText(folder / ".hidden", "mine too");
+  Checkpoint checkpoint = begin();
+  checkpoint.save("frame", number(7));
+  EXPECT_EQ(kept(begin()), 7);
+  checkpoint.discard();
+  EXPECT_FALSE(fs::exists(folder / "frame"));
+  for (const char* name : {"takes", "notes.txt", ".hidden"})
+    EXPECT_TRUE(fs::exists(folder / name)) << name;
 }
 
 TEST_F(CheckpointTest, OffersAreTakenByTime) {

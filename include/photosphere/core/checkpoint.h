@@ -121,7 +121,7 @@ class Checkpoint {
   /// True once something was kept or found that a further run can go on from.
   bool exists() const;
   const std::filesystem::path& folder() const { return m_folder; }
-  /// The work is done: removes the folder.
+  /// The work is done: removes what was kept, and the folder unless it holds something else.
   void discard();
 
  private:

@@ -95,9 +95,12 @@ int renderFrames(const scene::SceneFile& scene, const scene::FrameWriter& writer
   empty.volumes.clear();
   StatsFile stats(options.scene.stats, frames.size());
   bool planned = false;
-  const std::string more =
-      fmt::format("render {} {} {}", options.crop, options.write.floatColor, options.compression);
-  ResumableJob job = resumableJob(scene, options.scene, more, frames, options.write.path);
+  const scene::WriteRequest& write = options.write;
+  const std::string more = fmt::format(
+      "render {} {} {} {} {} {} {} {}", options.crop, write.floatColor, options.compression,
+      write.preview, write.exposure, write.ocioConfig, write.ocioDisplay, write.ocioView);
+  ResumableJob job =
+      resumableJob(scene, options.scene, more, frames, cacheFrames, options.write.path);
   const auto render = [&](std::int64_t frame) {
     const std::string path = framePath(options.write.path, frame);
     if (options.scene.frames.skipExisting && image::exrIsComplete(path))
@@ -116,6 +119,9 @@ int renderFrames(const scene::SceneFile& scene, const scene::FrameWriter& writer
       stats.keep(frame);
       return printLine("frame {}: {} was finished before the interruption", frame, path);
     }
+    if (!smoke)
+      log::warning("frame {}: without smoke: outside the caches' frames (--cache-hold clip)",
+                   frame);
     request.checkpoint = &job.begin(frame);
     const bool reached = renderOne(smoke ? scene : empty, frame, options, request, writer, stats);
     job.finished(frame, !reached);

@@ -58,8 +58,8 @@ int traceFrames(const scene::SceneFile& scene, const TraceArguments& options) {
   files.writes("--stats", options.scene.stats, frames);
   StatsFile stats(options.scene.stats, frames.size());
   bool planned = false;
-  ResumableJob job =
-      resumableJob(scene, options.scene, "trace " + options.shardText, frames, options.output);
+  ResumableJob job = resumableJob(scene, options.scene, "trace " + options.shardText, frames,
+                                  cacheFrames, options.output);
   const auto trace = [&](std::int64_t frame) {
     const std::string path = framePath(options.output, frame);
     if (options.scene.frames.skipExisting && vdbIsComplete(path))
