@@ -98,11 +98,14 @@ constexpr std::size_t kMostPixels = std::size_t{1} << 26;
 
 std::unique_ptr<Light> fromFile(const std::string& path, const Rgb& scale) {
   image::LoadedImage loaded = image::loadImage(path);
-  if (loaded.image.pixelCount() > kMostPixels)
+  const image::Window& whole = loaded.image.displayWindow();
+  const auto pixels =
+      static_cast<std::size_t>(whole.width) * static_cast<std::size_t>(whole.height);
+  if (std::max(pixels, loaded.image.pixelCount()) > kMostPixels)
     throw ConfigError(
         fmt::format("{}: {} x {} pixels are more than the 8192 x 8192 that an "
                     "environment may have; scale it down",
-                    path, loaded.image.width(), loaded.image.height()));
+                    path, whole.width, whole.height));
   if (loaded.colorSpace == "sRGB")
     throw ConfigError(
         fmt::format("{}: holds values for a display (sRGB), not light; use an EXR or "

@@ -44,20 +44,27 @@ std::string InvalidPixels::text() const {
 
 void EnvironmentMap::readPixels(const image::Image& image, const Rgb& scale) {
   const auto red = image.channel("R"), green = image.channel("G"), blue = image.channel("B");
-  m_pixels.resize(image.pixelCount());
-  for (std::size_t i = 0; i < m_pixels.size(); ++i) {
-    if (count({red[i], green[i], blue[i]}, m_invalid) && m_invalid.total() == 1)
-      m_invalid.first = {static_cast<int>(i % static_cast<std::size_t>(m_width)),
-                         static_cast<int>(i / static_cast<std::size_t>(m_width))};
-    m_pixels[i] = scale * Rgb(usable(red[i]), usable(green[i]), usable(blue[i]));
-    const Rgb& p = m_pixels[i];
-    m_brightest = std::max(m_brightest, maxComponent(p));
-    m_grey = m_grey && p.r == p.g && p.g == p.b;
-  }
+  const image::Window &data = image.dataWindow(), &whole = image.displayWindow();
+  const image::Window both = image::intersection(data, whole);
+  const auto width = static_cast<std::size_t>(m_width);
+  m_pixels.assign(width * static_cast<std::size_t>(m_height), Rgb(0.0f));
+  for (int y = both.y; y < both.y + both.height; ++y)
+    for (int x = both.x; x < both.x + both.width; ++x) {
+      const std::size_t from =
+          static_cast<std::size_t>(y - data.y) * static_cast<std::size_t>(data.width) +
+          static_cast<std::size_t>(x - data.x);
+      const Vec2i at(x - whole.x, y - whole.y);
+      if (count({red[from], green[from], blue[from]}, m_invalid) && m_invalid.total() == 1)
+        m_invalid.first = {at.x, at.y};
+      Rgb& p = m_pixels[static_cast<std::size_t>(at.y) * width + static_cast<std::size_t>(at.x)];
+      p = scale * Rgb(usable(red[from]), usable(green[from]), usable(blue[from]));
+      m_brightest = std::max(m_brightest, maxComponent(p));
+      m_grey = m_grey && p.r == p.g && p.g == p.b;
+    }
 }
 
 EnvironmentMap::EnvironmentMap(const image::Image& image, const Rgb& scale)
-    : m_width(image.width()), m_height(image.height()) {
+    : m_width(image.displayWindow().width), m_height(image.displayWindow().height) {
   readPixels(image, scale);
   for (int y = 0; y <= m_height; ++y)
     m_latitudes.push_back(1.0 - oneMinusCos(kPi * y / m_height));

@@ -25,7 +25,8 @@ struct InvalidPixels {
 /// left. Immutable; thread-safe; same bits on every CPU but for `radiance`.
 class EnvironmentMap {
  public:
-  /// @param image  R, G, B; at most 2^26 pixels. Values below 0 and not finite count as 0.
+  /// @param image  R, G, B; at most 2^26 pixels. Values below 0 and not finite count as 0. The
+  ///               display window is all of the sphere, black where the data window has nothing.
   /// @param scale  multiplies it
   /// @throws ConfigError where pixels add up to more than a float holds
   EnvironmentMap(const image::Image& image, const Rgb& scale);

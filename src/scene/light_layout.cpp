@@ -3,11 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "effect_plan.h"
 #include "estimator_options.h"
 #include "light_notes.h"
 #include "light_voxels.h"
+#include "photosphere/cameras/moving_camera.h"
 #include "photosphere/volume/rasterize.h"
 
 namespace photosphere::scene {
@@ -54,19 +56,51 @@ void heedSharpLobes(const ParamValues& e, double sharpest, FrameSetup& setup) {
 // which light for that one eye serves [rad].
 constexpr double kSmallParallax = 0.1;
 
+// Angle under which the nearest smoke sees the lens from its middle to its edge. Around an eye in
+// smoke that is what lies a light voxel away.
+double lensParallax(const FrameSetup& setup) {
+  if (!(setup.lens.radius > 0) || setup.worldBounds.empty()) return 0.0;
+  const Vec3d eye = cameras::placementOf(*setup.camera).eye;
+  const Vec3d nearest = setup.worldBounds.nearest(eye);
+  const double voxel =
+      setup.layout.lightVoxel * setup.medium->voxelEdge() / setup.space.metersPerUnit;
+  return std::atan2(setup.lens.radius, glm::length(eye - nearest) + voxel);
+}
+
+// Light is looked up toward the eye of the ray where it is stored for all directions, unless the
+// scene says otherwise.
 void heedParallax(const SceneFile& scene, FrameSetup& setup) {
-  estimators::LightFieldLayout& l = setup.layout;
-  const double parallax = setup.motion ? setup.motion->parallax(setup.worldBounds) : 0.0;
-  if (scene.estimator.text("type") != "photosphere" || l.basis != estimators::Basis::view ||
-      parallax <= kSmallParallax)
+  using namespace estimators;
+  const ParamValues& e = scene.estimator;
+  LightFieldLayout& l = setup.layout;
+  const double moving = setup.motion ? setup.motion->parallax(setup.worldBounds) : 0.0;
+  const double lens = lensParallax(setup);
+  if (e.text("type") != "photosphere" || l.evaluate != Evaluate::perView ||
+      std::max(moving, lens) <= kSmallParallax)
     return;
-  const bool chosen = scene.estimator.text("basis") == "auto";
-  if (chosen) l.basis = estimators::Basis::histogram;
+  const bool free = e.text("basis") == "auto" || l.basis != Basis::view;
+  const bool smoothing = e.given("smoothing") && l.smoothing != Smoothing::twicing &&
+                         l.smoothing != Smoothing::visible;
+  const bool chosen = free && !e.given("evaluate") && !smoothing;
+  if (chosen) {
+    if (l.basis == Basis::view) l.basis = Basis::histogram;
+    l.evaluate = Evaluate::perStep;
+  }
+  const std::string seen = moving > lens
+                               ? fmt::format(
+                                     "while the shutter is open the smoke sees the camera move by "
+                                     "{:.2g} degrees",
+                                     2 * moving * 180 / kPi)
+                               : fmt::format("the nearest smoke sees the lens under {:.2g} degrees",
+                                             2 * lens * 180 / kPi);
   setup.notes.push_back(fmt::format(
-      "while the shutter is open the smoke sees the camera move by {:.2g} degrees: light is {}",
-      2 * parallax * 180 / kPi,
-      chosen ? fmt::format("stored in {} bins of direction, which serve every eye", l.bins())
-             : "stored for the eye in the middle; estimator.basis = \"histogram\" serves all"));
+      "{}: light is {}", seen,
+      chosen
+          ? fmt::format("stored in {} bins of direction and looked up toward the eye of each ray "
+                        "(estimator.evaluate = \"per_step\")",
+                        l.bins())
+          : "that toward the eye in the middle; estimator.basis = \"histogram\" with evaluate = "
+            "\"per_step\" serves all"));
 }
 
 constexpr double kHalfDiagonal = 0.8661;  // of a cube of edge 1, and a little

@@ -38,6 +38,46 @@ struct Sky : ::testing::Test {
   test::TemporaryFolder folder;
 };
 
+// What lies around a picture that was trimmed to its light is dark, and what lies outside it is cut
+// off: the display window is the sphere.
+TEST_F(Sky, TheDisplayWindowIsTheSphere) {
+  const image::Image whole = sky(64, 32);
+  const auto windowed = [&](const image::Window& data, const image::Window& display) {
+    image::Image picture(data, display);
+    picture.addLayer("", image::ChannelKind::color);
+    for (int y = 0; y < data.height; ++y)
+      for (int x = 0; x < data.width; ++x) {
+        const Vec2i at(x + data.x - display.x, y + data.y - display.y);
+        const bool within = at.x >= 0 && at.y >= 0 && at.x < 64 && at.y < 32;
+        for (const char* channel : {"R", "G", "B"})
+          picture.channel(channel)[static_cast<std::size_t>(y * data.width + x)] =
+              within ? whole.channel(channel)[whole.index(at.x, at.y)] : 1e6f;
+      }
+    return picture;
+  };
+  const auto all = light(whole);
+  const auto trimmed = light(windowed({8, 4, 40, 20}, {0, 0, 64, 32}));
+  const auto moved = light(windowed({-90, 7, 64, 32}, {-90, 7, 64, 32}));
+  const auto wider = light(windowed({-3, -2, 70, 36}, {0, 0, 64, 32}));
+  for (int y = 0; y < 32; ++y)
+    for (int x = 0; x < 64; ++x) {
+      const double latitude = kPi * (y + 0.5) / 32, longitude = kPi * (1 - (x + 0.5) / 32);
+      const Vec3f d(Vec3d(std::sin(latitude) * std::sin(longitude), std::cos(latitude),
+                          std::sin(latitude) * std::cos(longitude)));
+      const bool inside = x > 8 && x < 47 && y > 4 && y < 23;
+      const bool outside = x < 7 || x > 48 || y < 3 || y > 24;
+      const float there = all->background(d).x;
+      if (inside) {
+        EXPECT_NEAR(trimmed->background(d).x, there, 1e-3f * there) << x << ", " << y;
+      }
+      if (outside) {
+        EXPECT_EQ(trimmed->background(d).x, 0.0f) << x << ", " << y;
+      }
+      EXPECT_EQ(moved->background(d).x, there) << x << ", " << y;
+      EXPECT_EQ(wider->background(d).x, there) << x << ", " << y;
+    }
+}
+
 // Integral of the background over the sphere, by a fine lattice.
 Vec3d integralOf(const Light& light) {
   Vec3d sum(0.0);

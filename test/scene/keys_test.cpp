@@ -306,6 +306,7 @@ TEST_F(ShotTest, TheViewIsThatOfTheMiddleOfTheShutter) {
       "camera.position=[{ frame = -3, value = [-1.2, 0, 6] }, { frame = 9, value = [1.2, 0, 6] }]";
   const FrameSetup wide = setUpFrame(scene({fast, "camera.shutter=[-6, 6]"}), 3);
   EXPECT_EQ(wide.layout.basis, estimators::Basis::histogram);
+  EXPECT_EQ(wide.layout.evaluate, estimators::Evaluate::perStep);
   ASSERT_EQ(wide.notes.size(), 1u);
   EXPECT_TRUE(contains(wide.notes[0], "bins of direction")) << wide.notes[0];
   // Every note about bins names as many as there are.
@@ -324,6 +325,15 @@ TEST_F(ShotTest, TheViewIsThatOfTheMiddleOfTheShutter) {
       setUpFrame(scene({fast, "camera.shutter=[-6, 6]", "estimator.smoothing=visible"}), 3);
   EXPECT_EQ(seen.layout.basis, estimators::Basis::histogram);
   EXPECT_EQ(seen.layout.smoothing, estimators::Smoothing::visible);
+  const FrameSetup resolved =
+      setUpFrame(scene({fast, "camera.shutter=[-6, 6]", "estimator.smoothing=plain"}), 3);
+  EXPECT_EQ(resolved.layout.evaluate, estimators::Evaluate::perView) << "which plain needs";
+  // So is a lens that is wide where the smoke is.
+  const FrameSetup lens = setUpFrame(scene({"camera.fstop=0.01"}), 3);
+  EXPECT_EQ(lens.layout.evaluate, estimators::Evaluate::perStep);
+  ASSERT_EQ(lens.notes.size(), 1u);
+  EXPECT_TRUE(contains(lens.notes[0], "sees the lens under")) << lens.notes[0];
+  EXPECT_EQ(setUpFrame(scene({"camera.fstop=2"}), 3).layout.basis, estimators::Basis::view);
 }
 
 TEST_F(ShotTest, FramesAreThoseOfTheirTime) {

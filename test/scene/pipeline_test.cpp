@@ -115,6 +115,26 @@ TEST_F(PipelineTest, TwoOverlappingVolumesAddUp) {
   EXPECT_NEAR(meanOf(twice.layers.multiple) / meanOf(once.layers.multiple), 1.0, 0.02);
 }
 
+// Bins that are wider than a lobe are named, those of a lobe backward sooner: its light comes back.
+TEST_F(PipelineTest, LobesNarrowerThanBinsAreNamed) {
+  const std::string text = ballScene(ball("a.vdb"), Vec3d(0), 1);
+  const auto named = [&](const char* g, const char* rows) {
+    const FrameSetup setup = setUpFrame(
+        scene(text, {std::string("volume.0.phase={ g = ") + g + " }", "estimator.basis=histogram",
+                     std::string("estimator.rows=") + rows}),
+        1);
+    return std::any_of(setup.notes.begin(), setup.notes.end(), [](const std::string& note) {
+      return contains(note, "narrower than the directions");
+    });
+  };
+  EXPECT_FALSE(named("0", "2"));
+  EXPECT_FALSE(named("0.9", "4"));
+  EXPECT_TRUE(named("0.96", "4"));
+  EXPECT_FALSE(named("-0.8", "4"));
+  EXPECT_TRUE(named("-0.9", "4"));
+  EXPECT_FALSE(named("-0.9", "8"));
+}
+
 // A sharp lobe makes bright blocks of single photons where directions are not smoothed.
 TEST_F(PipelineTest, DirectionsOfSharpLobesAreSmoothed) {
   const std::string text = ballScene(ball("a.vdb"), Vec3d(0), 1);
