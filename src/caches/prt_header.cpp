@@ -14,7 +14,6 @@ namespace photosphere::caches {
 namespace {
 
 constexpr std::size_t kMaxStride = std::size_t(1) << 20;
-constexpr std::int32_t kMaxChannels = 1024;
 constexpr Scalar kTypes[] = {Scalar::i16, Scalar::i32, Scalar::i64, Scalar::f16,
                              Scalar::f32, Scalar::f64, Scalar::u16, Scalar::u32,
                              Scalar::u64, Scalar::i8,  Scalar::u8};
@@ -105,7 +104,7 @@ void readChannels(FileReader& file, RecordLayout& layout) {
   file.number<std::int32_t>(kLittle, "the channel list");  // always 4
   const auto channels = file.number<std::int32_t>(kLittle, "the channel list");
   const auto length = file.number<std::int32_t>(kLittle, "the channel list");
-  if (channels < 1 || channels > kMaxChannels ||
+  if (channels < 1 || channels > static_cast<std::int32_t>(kMaxPrtChannels) ||
       length < static_cast<std::int32_t>(kPrtChannelRecord) || length > 4096 ||
       static_cast<std::uint64_t>(channels) > file.remaining() / static_cast<std::uint64_t>(length))
     throw InputError(file.path(),

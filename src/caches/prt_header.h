@@ -14,6 +14,7 @@ inline constexpr std::string_view kPrtMagic{"\xC0PRT\r\n\x1A\n", 8};
 inline constexpr std::size_t kPrtFixedHeader = 56;
 inline constexpr std::size_t kPrtChannelRecord = 44;
 inline constexpr std::size_t kPrtChannelName = 32;
+inline constexpr std::size_t kMaxPrtChannels = 1024;
 inline constexpr std::int64_t kPrtUnfinished = -1;
 
 struct PrtHeader {

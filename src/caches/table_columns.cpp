@@ -77,6 +77,19 @@ bool TableColumn::store(std::size_t row, int component, std::string_view cell) {
   return parseReal(cell, m_reals[at]);
 }
 
+namespace {
+
+// Whether no value is too large for a float, or so small that it would lose digits.
+bool fitFloat(const std::vector<double>& values) {
+  return std::all_of(values.begin(), values.end(), [](double v) {
+    const double size = std::abs(v);
+    return !(size < std::numeric_limits<float>::min() && size > 0) &&
+           !(size > std::numeric_limits<float>::max() && std::isfinite(size));
+  });
+}
+
+}  // namespace
+
 volume::Attribute TableColumn::takeAttribute(std::size_t rows) {
   const std::size_t values = rows * m_group.columns.size();
   ensure(values);
@@ -87,7 +100,7 @@ volume::Attribute TableColumn::takeAttribute(std::size_t rows) {
   if (m_kind == Kind::text) {
     attribute.data = std::move(m_texts);
   } else if (m_kind == Kind::real) {
-    if (m_digits <= kFloatDigits)
+    if (m_digits <= kFloatDigits && fitFloat(m_reals))
       attribute.data = narrowed<float>(m_reals);
     else
       attribute.data = std::move(m_reals);

@@ -45,7 +45,8 @@ void checkWritable(const std::string& path) {
 
 bool vdbIsComplete(const std::string& path) {
   std::string reason;
-  return std::filesystem::is_regular_file(path) && volume::probeVdb(path, reason);
+  std::error_code error;
+  return std::filesystem::is_regular_file(path, error) && volume::probeVdb(path, reason);
 }
 
 namespace {

@@ -47,8 +47,20 @@ void refuseEmptyNames(CLI::App& command) {
   }
 }
 
+// After `--option=` the parser would take the next argument for the value.
+void refuseMissingValues(int argc, char** argv) {
+  for (int i = 1; i < argc; ++i) {
+    const std::string_view argument = argv[i];
+    if (argument == "--") return;
+    if (argument.starts_with("--") && argument.find('=') == argument.size() - 1)
+      throw ConfigError(fmt::format(
+          "{} has no value after its =; is a variable of the shell not set?", argument));
+  }
+}
+
 int parseAndRun(int argc, char** argv) {
   checkCommandName(argc, argv);
+  refuseMissingValues(argc, argv);
   CLI::App app("Renders light that is scattered many times in smoke.", "photosphere");
   app.set_version_flag("--version", versionText());
   app.require_subcommand(1);

@@ -18,12 +18,13 @@ std::string describe(const NumberBounds& bounds) {
 }
 
 template <class Whole>
-CLI::Validator ofType(const char* range) {
-  return {[range](std::string& text) -> std::string {
+CLI::Validator ofType(const char* range, Whole least = std::numeric_limits<Whole>::min(),
+                      Whole most = std::numeric_limits<Whole>::max()) {
+  return {[range, least, most](std::string& text) -> std::string {
             Whole value = 0;
             const char* const end = text.data() + text.size();
             const auto [next, error] = std::from_chars(text.data(), end, value);
-            if (error == std::errc() && next == end) return {};
+            if (error == std::errc() && next == end && value >= least && value <= most) return {};
             return fmt::format("must be a whole number {}, not '{}'", range, text);
           },
           ""};
@@ -44,6 +45,11 @@ CLI::Validator finiteNumber(const NumberBounds& bounds) {
 
 CLI::Validator countingNumber() {
   return ofType<std::uint64_t>("of at least 0");
+}
+
+CLI::Validator frameNumber() {
+  constexpr std::int64_t most = 1'000'000'000;
+  return ofType<std::int64_t>("from minus to plus a billion", -most, most);
 }
 
 CLI::Validator wholeNumber() {

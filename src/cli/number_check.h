@@ -25,4 +25,7 @@ CLI::Validator countingNumber();
 /// that, and what is no whole number.
 CLI::Validator wholeNumber();
 
+/// The same for frames and what is added to them: up to a billion.
+CLI::Validator frameNumber();
+
 }  // namespace photosphere::cli

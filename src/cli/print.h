@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "photosphere/core/log.h"
 #include "photosphere/core/types.h"
 
 namespace photosphere::cli {
@@ -14,7 +15,7 @@ namespace photosphere::cli {
 /// Prints one line, at once: whoever reads the pipe sees it when it is true.
 template <class... Args>
 void printLine(fmt::format_string<Args...> format, Args&&... args) {
-  const std::string line = fmt::format(format, std::forward<Args>(args)...) + '\n';
+  const std::string line = log::printable(fmt::format(format, std::forward<Args>(args)...)) + '\n';
   std::fwrite(line.data(), 1, line.size(), stdout);
   std::fflush(stdout);
 }

@@ -37,8 +37,8 @@ struct Token {
   int digits = 0;
 };
 
-// The frame token of a path, the last one when there are several.
-Token findToken(std::string_view path) {
+// The last frame token of some text.
+Token lastToken(std::string_view path) {
   Token found;
   for (std::size_t i = 0; i < path.size(); ++i) {
     Token token{i, 0, 0};
@@ -67,6 +67,18 @@ Token findToken(std::string_view path) {
   return found;
 }
 
+// The frame token of a path, the last one when there are several. A folder that is there under its
+// very name has none in it.
+Token findToken(std::string_view path) {
+  const Token found = lastToken(path);
+  const std::size_t slash = path.find('/', found.begin);
+  if (found.length == 0 || slash == std::string_view::npos) return found;
+  std::error_code error;
+  const bool literal =
+      std::filesystem::is_directory(std::filesystem::path(path.substr(0, slash)), error);
+  return literal ? Token{} : found;
+}
+
 // Keeps the first of equal frames, and the order.
 void dropRepeats(std::vector<std::int64_t>& frames) {
   std::unordered_map<std::int64_t, std::uint64_t> seen;  // 64 neighbours in one
@@ -85,8 +97,15 @@ std::vector<std::int64_t> parseFrames(std::string_view text) {
   std::vector<std::int64_t> frames;
   std::int64_t total = 0;
   std::string compact;
-  for (const char c : text)
-    if (c != ' ' && c != '\t') compact += c;
+  bool blank = false;
+  for (const char c : text) {
+    const bool digit = c >= '0' && c <= '9';
+    // Numbers with nothing but blanks between them are not one.
+    if (blank && digit && !compact.empty() && compact.back() >= '0' && compact.back() <= '9')
+      badRange(text, text);
+    blank = c == ' ' || c == '\t';
+    if (!blank) compact += c;
+  }
   std::string_view all = compact;
   if (all.empty()) throw ConfigError("frame range is empty (example: 1-48)");
   while (true) {
@@ -121,6 +140,7 @@ std::vector<std::int64_t> parseFrames(std::string_view text) {
     all.remove_prefix(comma + 1);
   }
   if (compact.find(',') != std::string::npos) dropRepeats(frames);
+  if (frames.empty()) throw ConfigError(fmt::format("frame range '{}' holds no frame", text));
   return frames;
 }
 

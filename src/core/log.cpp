@@ -30,8 +30,22 @@ Level level() {
   return g_level;
 }
 
-void write(Level level, const std::string& message) {
+std::string printable(const std::string& text) {
+  std::string out;
+  out.reserve(text.size());
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if ((byte < 0x20 && c != '\n' && c != '\t') || byte == 0x7f)
+      out += fmt::format("\\x{:02x}", byte);
+    else
+      out += c;
+  }
+  return out;
+}
+
+void write(Level level, const std::string& text) {
   if (level < g_level) return;
+  const std::string message = printable(text);
   switch (level) {
     case Level::debug:
       logger().debug(message);

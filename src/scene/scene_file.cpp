@@ -181,14 +181,25 @@ SceneFile parseScene(const std::string& text, const std::string& name,
   return scene;
 }
 
+namespace {
+
+constexpr std::size_t kLongestScene = 16 << 20;
+
+}  // namespace
+
 SceneFile loadScene(const std::filesystem::path& path, const std::vector<std::string>& sets) {
   checkReadable(path, "a scene file");
   std::ifstream in(path, std::ios::binary);
-  std::ostringstream text;
-  if (in.peek() != std::ifstream::traits_type::eof()) text << in.rdbuf();
+  // A device may have no end.
+  std::string text(kLongestScene + 1, '\0');
+  in.read(text.data(), static_cast<std::streamsize>(text.size()));
   if (!in.good() && !in.eof()) throw InputMissingError(path.string(), "cannot be read");
+  text.resize(static_cast<std::size_t>(in.gcount()));
+  if (text.size() > kLongestScene)
+    throw ConfigError(fmt::format("{}: is longer than {} MiB, and no scene file", path.string(),
+                                  kLongestScene >> 20));
   const std::filesystem::path folder = std::filesystem::absolute(path).parent_path();
-  SceneFile scene = parseScene(text.str(), path.string(), folder, sets);
+  SceneFile scene = parseScene(text, path.string(), folder, sets);
   scene.path = path.string();
   // An empty file is no scene of nothing: it was cut off, or never written.
   if (scene.volumes.empty())

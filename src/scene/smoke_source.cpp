@@ -180,6 +180,21 @@ void checkAlbedo(const std::string& path, const Grid& grid) {
                                        grid.name(), found.min, found.max));
 }
 
+// Beyond this floats do not hold the square of a distance.
+constexpr double kFarthest = 1e18;
+
+void checkReach(const VolumeEntry& entry, const VolumeSource& source) {
+  const Box3d box = source.bounds();
+  if (box.empty()) return;
+  const Vec3d far = glm::max(glm::abs(box.min), glm::abs(box.max));
+  if (maxComponent(far) <= kFarthest) return;
+  throw InputError(
+      source.path,
+      fmt::format("reaches {:.4g} scene units from the origin, and no more than {:g} can be "
+                  "rendered; mend the file's transform, or 'transform' and 'origin' of {}",
+                  maxComponent(far), kFarthest, entry.where));
+}
+
 }  // namespace
 
 std::string CacheGrids::listing() const {
@@ -296,6 +311,7 @@ VolumeSource readVolume(const SceneFile& scene, const VolumeEntry& entry, std::i
     heedInvalid(scene, "emission", temperature.empty(), source.emission, source);
   }
   if (!cache.grids.empty() && leavesOutStrays(entry)) leaveOutStrays(source);
+  checkReach(entry, source);
   if (wishes.particles)
     for (const Grid& grid : cache.pointGrids)
       for (const Vec3d& p : volume::gridToPoints(grid).positions)

@@ -59,10 +59,13 @@ void checkThere(const Grid& grid) {
 }  // namespace
 
 std::string InvalidValues::text() const {
+  const bool isFinite = std::isfinite(firstValue) && std::abs(firstValue) > kLargest;
   return fmt::format(
-      "{} NaN, {} infinite and {} negative values, the first ({}) at voxel ({}, {}, "
+      "{} NaN, {} infinite and {} negative values, the first ({}{}) at voxel ({}, {}, "
       "{})",
-      nans, infinities, negatives, firstValue, first.x, first.y, first.z);
+      nans, infinities, negatives, firstValue,
+      isFinite ? fmt::format(", past {:.2g}, counts as infinite", kLargest) : "", first.x, first.y,
+      first.z);
 }
 
 InvalidValues findInvalid(const Grid& grid, bool negatives) {

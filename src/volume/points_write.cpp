@@ -7,6 +7,7 @@
 #include <cctype>
 #include <cmath>
 #include <cstring>
+#include <set>
 
 #include "openvdb_grid.h"
 #include "photosphere/core/error.h"
@@ -168,13 +169,19 @@ void writeAttribute(PointTree& tree, const std::vector<WrittenLeaf>& leaves,
       attribute.data);
 }
 
-// Letters, digits and `_|:.` are what OpenVDB accepts.
-std::string storedName(const std::string& name) {
+// Letters, digits and `_|:` are what OpenVDB accepts. @param taken  names so far, of which none may
+// be another's
+std::string storedName(const std::string& name, std::set<std::string>& taken) {
   std::string result = name;
   for (char& c : result)
-    if (!std::isalnum(static_cast<unsigned char>(c)) && !std::strchr("_|:.", c)) c = '_';
+    if (!std::isalnum(static_cast<unsigned char>(c)) && !std::strchr("_|:", c)) c = '_';
   if (result.empty() || result == "P")
     throw ConfigError(fmt::format("a point attribute cannot be named \"{}\"", name));
+  while (!taken.insert(result).second)
+    result += '_';
+  if (result != name)
+    log::warning("attribute \"{}\" is stored as \"{}\": OpenVDB takes letters, digits, _, | and :",
+                 name, result);
   return result;
 }
 
@@ -204,8 +211,9 @@ Grid pointsToGrid(const ParticleSet& particles, std::string_view name, double vo
   auto tree = std::make_shared<PointTree>();
   const std::vector<WrittenLeaf> leaves = makeLeaves(*tree, bins);
   writePositions(leaves, bins, particles, *transform);
+  std::set<std::string> names;
   for (const Attribute& attribute : particles.attributes)
-    writeAttribute(*tree, leaves, bins, attribute, storedName(attribute.name));
+    writeAttribute(*tree, leaves, bins, attribute, storedName(attribute.name, names));
 
   auto grid = PointGrid::create(tree);
   grid->setTransform(transform);

@@ -77,6 +77,17 @@ TEST(TextTable, TakesTypesFromTheValues) {
   EXPECT_EQ(std::get<std::vector<std::string>>(set.find("name")->data).at(0), "a, \"b\"");
 }
 
+// Few digits, and more than a float holds all the same.
+TEST(TextTable, NumbersPastFloatsStay) {
+  const volume::ParticleSet set =
+      read("a.csv", "x,y,z,mass,big,zero\n1,2,3,1e-46,1e39,0\n4,5,6,2,3,0\n").particles.at(0);
+  EXPECT_EQ(set.find("mass")->number(0), 1e-46);
+  EXPECT_EQ(set.find("big")->number(0), 1e39);
+  const volume::ParticleSet plain =
+      read("a.csv", "x,y,z,mass\n1,2,3,1e-30\n4,5,6,inf\n").particles.at(0);
+  EXPECT_TRUE(std::holds_alternative<std::vector<float>>(plain.find("mass")->data));
+}
+
 TEST(TextTable, EmptyCellsAreNotANumberAndAreNoted) {
   const CacheContent content = read("a.csv", "x,y,z,mass\n1,2,3,\n1,2,3,4\n");
   EXPECT_TRUE(std::isnan(content.particles.at(0).find("mass")->number(0)));

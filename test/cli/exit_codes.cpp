@@ -91,6 +91,15 @@ const Case kUsage[] = {
      {"render", "smoke.vdb", "-o", "x.exr", "--frames", "2147483648"},
      2,
      "frames up to a billion"},
+    {"FramesWithoutValue",
+     {"render", "smoke.vdb", "-o", "x.exr", "--frames=", "--dry-run"},
+     2,
+     "--frames= has no value after its =; is a variable of the shell not set?"},
+    {"CacheOffsetPastABillion",
+     {"render", "smoke.vdb", "-o", "x.exr", "--cache-offset", "9223372036854775807"},
+     2,
+     "--cache-offset: must be a whole number from minus to plus a billion"},
+    {"SceneWithoutEnd", {"render", "/dev/zero", "-o", "x.exr"}, 2, "/dev/zero: is longer than"},
     {"VerboseAndQuiet", {"list", "-v", "-q"}, 2, "--quiet"},
     {"ProgressStyle", {"list", "--progress", "spinner"}, 2, "spinner"},
     {"TooMuchLight",
@@ -173,6 +182,15 @@ const Case kFiles[] = {
      {"convert", "smoke.vdb", "-o", "x.vdb", "--origin", "1e30,0,0"},
      2,
      "smoke.vdb: moved by --origin: "},
+    {"RenderFar",
+     {"render", "smoke.vdb", "-o", "x.exr", "-s",
+      "volume.0.transform=[1e200,0,0,0, 0,1e200,0,0, 0,0,1e200,0, 0,0,0,1]"},
+     4,
+     "smoke.vdb: reaches "},
+    {"NameTooLong",
+     {"convert", "smoke.vdb", "-o", std::string(252, 'n') + ".vdb"},
+     6,
+     "the name has 256 bytes, of which the file system takes 255; name it shorter"},
     {"ConvertHeavy",
      {"convert", "heavy.csv", "-o", "x.vdb"},
      4,
@@ -201,6 +219,30 @@ TEST(ExitCode, DamagedFileIsReportedByInspect) {
   const RunResult result = runTool({"inspect", (folder / "cut.vdb").string()});
   EXPECT_EQ(result.exitCode, 4);
   EXPECT_NE(result.out.find("cut.vdb"), std::string::npos) << result.out;
+}
+
+// A temporary's name is longer than its target's: that of the longest name is cut.
+TEST(ExitCode, TheLongestNameIsWritten) {
+  TemporaryFolder folder;
+  volume::writeVdb(folder / "smoke.vdb", {ballOfSmoke(0.1)});
+  const std::string name = std::string(251, 'n') + ".vdb";
+  const RunResult result = runTool({"convert", "smoke.vdb", "-o", name}, folder.path());
+  EXPECT_EQ(result.exitCode, 0) << result.err;
+  EXPECT_EQ(namesIn(folder.path()), (std::set<std::string>{name, "smoke.vdb"}));
+}
+
+// A file's names must not steer a terminal.
+TEST(ExitCode, NamesOfFilesArePrintedWithoutControlCharacters) {
+  TemporaryFolder folder;
+  const std::vector<float> values(64, 1.0f);
+  volume::writeVdb(folder / "steering.vdb",
+                   {volume::denseToGrid("a\x1b[31mb\x07", Vec3i(4), values, Mat4d(1.0))});
+  const RunResult inspected = runTool({"inspect", "steering.vdb"}, folder.path());
+  EXPECT_NE(inspected.out.find("grid a\\x1b[31mb\\x07"), std::string::npos) << inspected.out;
+  const RunResult rendered = runTool({"render", "steering.vdb", "-o", "x.exr"}, folder.path());
+  for (const RunResult& result : {inspected, rendered})
+    for (const char c : result.out + result.err)
+      EXPECT_TRUE(c == '\n' || static_cast<unsigned char>(c) >= 0x20) << int{c};
 }
 
 TEST(ExitCode, FullStandardOutputIsAnOutputError) {

@@ -20,11 +20,13 @@ TEST(Frames, ReadsEveryForm) {
   EXPECT_EQ(parseFrames("5-1"), Frames({5, 4, 3, 2, 1}));
   EXPECT_EQ(parseFrames("-10--8"), Frames({-10, -9, -8}));
   EXPECT_EQ(parseFrames("1-3, 2-4"), Frames({1, 2, 3, 4}));
+  EXPECT_EQ(parseFrames(" 1 - 3 , 5 "), Frames({1, 2, 3, 5}));
 }
 
 TEST(Frames, RefusesEverythingElse) {
-  for (const char* text : {"", "a", "1-", "1-5x0", "1-5x", "1:5", "1-5z2", "1,,2", "1-99999999999",
-                           "-9223372036854775808", "-9223372036854775808-5"})
+  for (const char* text :
+       {"", "a", "1-", "1-5x0", "1-5x", "1:5", "1-5z2", "1,,2", "1-99999999999",
+        "-9223372036854775808", "-9223372036854775808-5", "1-3 5", "1 2", "1-5y1"})
     EXPECT_THROW(parseFrames(text), ConfigError) << text;
 }
 
@@ -47,6 +49,20 @@ TEST(Frames, PathsTakeEveryToken) {
   EXPECT_EQ(framePath("a.####.exr", -10), "a.-0010.exr");
   EXPECT_EQ(framePath("plain.exr", 3), "plain.exr");
   EXPECT_FALSE(hasFrameToken("plain.exr"));
+}
+
+// A folder's name may look like a token.
+TEST(Frames, FoldersThatAreThereHaveNoToken) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directories(folder / "take#2/v%03d");
+  const std::string there = (folder / "take#2/v%03d/").string();
+  EXPECT_FALSE(hasFrameToken(there + "smoke.vdb"));
+  EXPECT_EQ(framePath(there + "smoke.vdb", 7), there + "smoke.vdb");
+  EXPECT_EQ(framePath(there + "smoke.##.vdb", 7), there + "smoke.07.vdb");
+  writeText(folder / "take#2/v%03d/smoke.07.vdb", "");
+  EXPECT_EQ(findFrames(there + "smoke.##.vdb"), Frames({7}));
+  const std::string each = (folder / "frame.####/smoke.vdb").string();
+  EXPECT_EQ(framePath(each, 7), (folder / "frame.0007/smoke.vdb").string());
 }
 
 TEST(Frames, FindsWhatIsThere) {

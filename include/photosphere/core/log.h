@@ -12,7 +12,11 @@ enum class Level { debug, info, warning, error, off };
 
 void setLevel(Level level);
 Level level();
-void write(Level level, const std::string& message);
+/// Text with control characters other than line breaks and tabs as \xNN: names come from files,
+/// and must not steer a terminal.
+std::string printable(const std::string& text);
+/// Writes a message, printable.
+void write(Level level, const std::string& text);
 
 template <class... Args>
 void debug(fmt::format_string<Args...> format, Args&&... args) {

@@ -178,6 +178,12 @@ void write(const std::filesystem::path& path, const CacheContent& content, const
     addChannel(attribute->name, attribute->arity, memoryType(*attribute), layout, list, taken,
                path.string());
 
+  if (layout.channels.size() > kMaxPrtChannels)
+    throw ConfigError(
+        fmt::format("{}: {} channels are more than the {} of a PRT file; write .vdb, "
+                    ".ply or .csv",
+                    path.string(), layout.channels.size(), kMaxPrtChannels));
+
   const std::string chunks = metadataChunks(particles.set, content);
   std::string header(kPrtMagic);
   put(header, static_cast<std::int32_t>(kPrtFixedHeader + chunks.size()));

@@ -58,7 +58,8 @@ std::vector<std::int64_t> chooseFrames(const ConvertArguments& options) {
 }
 
 bool isComplete(const std::string& path) {
-  if (!std::filesystem::is_regular_file(path)) return false;
+  std::error_code unknown;
+  if (!std::filesystem::is_regular_file(path, unknown)) return false;
   std::string reason;
   try {
     const caches::CacheFormat& format = caches::detectFormat(path);
