@@ -109,12 +109,25 @@ std::optional<StateReader> openSealed(const fs::path& path) {
   return StateReader(path, std::move(in), size);
 }
 
-// Whether a file is one that `writeSealed` wrote, or began to.
-bool isOurs(const fs::path& path) {
+// Not through a link, which is somebody's.
+bool isFolder(const fs::path& path) {
+  std::error_code error;
+  return fs::is_directory(fs::symlink_status(path, error));
+}
+
+// Parts have no dot in their names, temporaries of them a mark.
+bool mayBeOurs(const fs::path& path) {
   std::error_code error;
   if (!fs::is_regular_file(fs::symlink_status(path, error))) return false;
-  if (path.filename().string().starts_with('.'))
-    return path.filename().string().find(".tmp-photosphere-") != std::string::npos;
+  const std::string name = path.filename().string();
+  return name.find('.') == std::string::npos ||
+         (name.starts_with('.') && name.find(".tmp-photosphere-") != std::string::npos);
+}
+
+// Whether a file is one that `writeSealed` wrote, or began to.
+bool isOurs(const fs::path& path) {
+  if (!mayBeOurs(path)) return false;
+  if (path.filename().string().starts_with('.')) return true;
   std::ifstream in(path, std::ios::binary);
   std::string magic(kMagic.size(), '\0');
   in.read(magic.data(), static_cast<std::streamsize>(magic.size()));
@@ -164,11 +177,11 @@ void Checkpoint::identify(const std::string& work) {
   m_work = work;
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(m_folder, error)) {
-    if (entry.path().filename() == kNoteFile || !entry.is_regular_file(error)) continue;
+    if (entry.path().filename() == kNoteFile || !mayBeOurs(entry.path())) continue;
     const bool ours = isOurs(entry.path());
     // Left by a run that was killed while it wrote.
     if (entry.path().filename().string().starts_with('.')) {
-      if (ours) fs::remove(entry.path(), error);
+      fs::remove(entry.path(), error);
       continue;
     }
     std::optional<StateReader> kept = openSealed(entry.path());
@@ -207,7 +220,7 @@ void Checkpoint::save(const std::string& part, const WriteState& write) {
   } catch (const OutputError& error) {
     if (!std::exchange(m_warned, true)) log::warning("no checkpoint: {}", error.what());
     std::error_code ignored;
-    if (exists()) fs::remove(m_folder, ignored);  // an empty folder is no checkpoint
+    if (isFolder(m_folder)) fs::remove(m_folder, ignored);  // an empty one is no checkpoint
   }
   m_last = Clock::now();
   m_saveSeconds = std::chrono::duration<double>(m_last - start).count();
@@ -239,7 +252,7 @@ void Checkpoint::discard() {
   for (const fs::path& path : ours)
     fs::remove(path, error);
   // What somebody else keeps there stays.
-  if (exists()) fs::remove(m_folder, error);
+  if (isFolder(m_folder)) fs::remove(m_folder, error);
 }
 
 }  // namespace photosphere

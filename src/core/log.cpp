@@ -33,12 +33,18 @@ Level level() {
 std::string printable(const std::string& text) {
   std::string out;
   out.reserve(text.size());
-  for (const char c : text) {
-    const auto byte = static_cast<unsigned char>(c);
-    if ((byte < 0x20 && c != '\n' && c != '\t') || byte == 0x7f)
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const auto byte = static_cast<unsigned char>(text[i]);
+    const unsigned next = i + 1 < text.size() ? static_cast<unsigned char>(text[i + 1]) : 0;
+    if (byte < 0x20 && byte != '\n' && byte != '\t') {
       out += fmt::format("\\x{:02x}", byte);
-    else
-      out += c;
+    } else if (byte == 0xc2 && next >= 0x80 && next < 0xa0) {
+      // The same beyond ASCII, in a form that JSON has, too.
+      out += fmt::format("\\u{:04x}", next);
+      ++i;
+    } else {
+      out += text[i];
+    }
   }
   return out;
 }

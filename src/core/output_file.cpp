@@ -59,9 +59,18 @@ std::size_t longestName(const fs::path& folder) {
   return most > 0 ? static_cast<std::size_t>(most) : 255;
 }
 
-bool isOfProcess(const fs::path& path) {
-  const std::string name = path.string();
-  return name.starts_with("/dev/") || name.starts_with("/proc/");
+// Whether a path leads to an open file of the process, such as /dev/stdout.
+bool isOfProcess(fs::path path) {
+  std::error_code error;
+  for (int links = 0; links < 8; ++links) {
+    const std::string name = path.string();
+    if (name.starts_with("/dev/fd/") || name.starts_with("/dev/std") || name.starts_with("/proc/"))
+      return true;
+    const fs::path next = fs::read_symlink(path, error);
+    if (error) return false;
+    path = next.is_absolute() ? next : path.parent_path() / next;
+  }
+  return false;
 }
 
 // Name of the temporary of a target. Keeps the extension, by which some libraries choose the
@@ -108,13 +117,7 @@ OutputFile::OutputFile(const fs::path& target) : m_target(target) {
                                            describeWriteError(error.value()));
   if (access(folder.c_str(), W_OK) != 0)
     throw OutputError(target.string(), "cannot write in its folder: " + describeWriteError(errno));
-  const std::size_t longest = longestName(folder);
-  if (const std::size_t bytes = m_target.filename().string().size(); bytes > longest)
-    throw OutputError(target.string(),
-                      fmt::format("the name has {} bytes, of which the file system takes {}; name "
-                                  "it shorter",
-                                  bytes, longest));
-  m_temporary = folder / temporaryName(m_target, longest);
+  m_temporary = folder / temporaryName(m_target, longestName(folder));
   m_slot = claimSlot(fs::absolute(m_temporary).string());
   // Some file systems tell only now that they take no file.
   const int fd = open(m_temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
@@ -124,6 +127,8 @@ OutputFile::OutputFile(const fs::path& target) : m_target(target) {
     throw OutputError(target.string(), "cannot create: " + describeWriteError(reason));
   }
   close(fd);
+  // Whoever writes makes it anew: a umask may keep even its owner from opening it again.
+  unlink(m_temporary.c_str());
 }
 
 OutputFile::~OutputFile() {
@@ -171,6 +176,8 @@ std::string describeWriteError(int error) {
       return what + "; free some, or write elsewhere";
     case EFBIG:
       return what + "; raise the limit of file sizes (ulimit -f), or write elsewhere";
+    case ENAMETOOLONG:
+      return what + "; name it shorter";
     case EACCES:
     case EPERM:
     case EROFS:

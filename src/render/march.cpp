@@ -152,8 +152,11 @@ class MarchIntegrator final : public Integrator {
       }
       // The source inside a step varies by the extinction of the light on its way in, which the
       // midpoint rule sees to (depth)^2 / 24: dense smoke takes finer steps, in powers of two of
-      // one lattice.
-      const float coarser = m_emission ? 1.0f : m_medium.majorants().coarseness(walk.cell());
+      // one lattice. Where all voxels are coarser steps may be as long as those, at most.
+      const float coarseness = m_emission ? 1.0f : m_medium.majorants().coarseness(walk.cell());
+      float coarser = coarseness;
+      while (coarser > 1.0f && m_step * coarser > m_voxel * coarseness)
+        coarser *= 0.5f;
       float h = m_step * coarser, perLength = m_stepsPerLength / coarser;
       while (h * majorant > kStepDepth && h > m_step * kFinest) {
         h *= 0.5f;
@@ -162,7 +165,8 @@ class MarchIntegrator final : public Integrator {
       Vec3f carrier(0.0f);  // read where smoke moves
       const auto rises = [&](float from, float to) {
         return isFoot(extinctionAt(extinction, ray, from, when, carrier),
-                      extinctionAt(extinction, ray, to, when, carrier));
+                      extinctionAt(extinction, ray, to, when, carrier)) &&
+               (!m_emission || isFoot(glowAt(ray, from, when), glowAt(ray, to, when)));
       };
       float t0 = std::max(done, walk.begin());
       // The next point of the step lattice beyond t0; a step may run on past the cell, where the
@@ -173,17 +177,20 @@ class MarchIntegrator final : public Integrator {
       const auto place = [&](double number) {
         return static_cast<float>((number + static_cast<double>(offset)) * static_cast<double>(h));
       };
-      const bool whole = h <= coarser * m_voxel;  // else features are shorter than steps
+      // Else features are shorter than steps.
+      const bool whole = h <= coarseness * m_voxel;
       if (whole && done < t0 && rises(t0 + kBeside * h, 0.5f * (t0 + place(k))))
         t0 = std::max(done, place(k - 1.0));
       for (; t0 < end; k += 1.0) {
         float t1 = place(k);
-        if (coarser > 1.0f) t1 = upToFiner(walk, t1, coarser);
+        const float cut = coarseness > 1.0f ? upToFiner(walk, t1, coarseness) : t1;
+        const bool atFiner = cut < t1;
+        t1 = cut;
         if (t1 > ray.length &&
             !(whole && rises(ray.length - kBeside * h, 0.5f * (t0 + ray.length))))
           t1 = ray.length;
         if (!(t1 > t0 + kBeside * h)) {
-          if (t1 == ray.length) break;
+          if (t1 == ray.length || atFiner) break;
           continue;
         }
         const float sigma = extinctionAt(extinction, ray, 0.5f * (t0 + t1), when, carrier);
@@ -202,10 +209,14 @@ class MarchIntegrator final : public Integrator {
     return transmittance;
   }
 
+  float glowAt(const Segment& ray, float t, When when) const {
+    return maxComponent(m_medium.emitted(ray.origin + ray.direction * t, when));
+  }
+
   // A step of some coarseness, unless it would run on into a cell of finer voxels: up to that.
-  float upToFiner(volume::MajorantGrid::Walk walk, float t1, float coarser) const {
+  float upToFiner(volume::MajorantGrid::Walk walk, float t1, float coarseness) const {
     for (; !walk.done() && walk.begin() < t1; walk.advance())
-      if (m_medium.majorants().coarseness(walk.cell()) < coarser) return walk.begin();
+      if (m_medium.majorants().coarseness(walk.cell()) < coarseness) return walk.begin();
     return t1;
   }
 

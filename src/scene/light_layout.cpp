@@ -69,7 +69,8 @@ double lensParallax(const FrameSetup& setup) {
 
 // Light is looked up toward the eye of the ray where it is stored for all directions, unless the
 // scene says otherwise.
-void heedParallax(const SceneFile& scene, FrameSetup& setup) {
+void heedParallax(const SceneFile& scene, bool forLightCache, FrameSetup& setup) {
+  if (forLightCache) return;  // which any camera may read
   using namespace estimators;
   const ParamValues& e = scene.estimator;
   LightFieldLayout& l = setup.layout;
@@ -165,7 +166,7 @@ void chooseLayout(const SceneFile& scene, bool forLightCache, FrameSetup& setup)
   if (sharp && !e.given("rows")) l.rows = kSharpRows;  // should it come to bins
   // Light without directions serves every eye.
   const bool even = scattersEvenly(*setup.medium);
-  if (!even) heedParallax(scene, setup);
+  if (!even) heedParallax(scene, forLightCache, setup);
   if (sharp) heedSharpLobes(e, sharpest, setup);
   // Bins would all be read alike: one coefficient holds what counts.
   const bool ofBins = l.direction != sphere::DirectionDeposit::nearest ||

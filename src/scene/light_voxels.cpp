@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -27,7 +28,7 @@ constexpr std::uint64_t kMostFineBytes = 256 << 20;
 constexpr double kManyVoxels = 1 << 20, kManyTimes = 16;
 // Of a density voxel of the coarsest volume; more would tell next to nothing.
 constexpr double kCoarsestVoxel = 64;
-constexpr float kAlike = 0.5f;  // extinction of the thinnest channel over that of the densest
+constexpr float kAlike = 0.3f;  // extinction of the thinnest channel over that of the densest
 
 double lightVoxelEdge(const FrameSetup& setup) {
   return setup.layout.lightVoxel * setup.medium->voxelEdge();
@@ -37,6 +38,16 @@ double lightVoxelEdge(const FrameSetup& setup) {
 bool isDeep(const FrameSetup& setup, double depth) {
   const auto extinction = static_cast<float>(depth / lightVoxelEdge(setup));
   return setup.medium->majorants().shareAbove(extinction) > kThickShare;
+}
+
+// Extinction of the thinnest channel over that of the densest, in the volume where they differ
+// most.
+float thinnestChannel(const transport::Medium& medium) {
+  float least = 1.0f;
+  for (const transport::MediumVolume& volume : medium.volumes())
+    if (!volume.density.empty() && volume.densityScale > 0)
+      least = std::min({least, volume.tint.x, volume.tint.y, volume.tint.z});
+  return least;
 }
 
 // @return whether there were too many, of which coarser ones are not
@@ -114,7 +125,7 @@ void chooseSmoothing(const ParamValues& e, FrameSetup& setup) {
       l.holdsPower() || setup.medium->bounds().empty() || !isDeep(setup, kThickVoxel))
     return;
   // Weights are those of the densest channel: what is seen of the others lies deeper.
-  if (setup.medium->thinnestChannel() < kAlike) {
+  if (thinnestChannel(*setup.medium) < kAlike) {
     if (isDeep(setup, kOpaqueVoxel))
       setup.notes.push_back(
           "the smoke is opaque within each light voxel in its densest channel, and much thinner in "

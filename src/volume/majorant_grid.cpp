@@ -30,12 +30,16 @@ MajorantGrid::MajorantGrid(std::span<const MajorantSource> sources, const Walked
   m_values.assign(static_cast<std::size_t>(m_dims.x) * static_cast<std::size_t>(m_dims.y) *
                       static_cast<std::size_t>(m_dims.z),
                   0.0f);
-  const auto octavesOf = [&](const MajorantSource& source) {
-    const double times = finestSpacing(source.localFromNode) / spacing;
-    return static_cast<int>(std::clamp(std::floor(std::log2(times * (1 + 1e-6))), 0.0, 30.0));
-  };
   const auto holds = [](const MajorantSource& source) {
     return !source.field->empty() && source.scale > 0;
+  };
+  // Of what extinguishes: a flame's voxels may be finer.
+  double finest = std::numeric_limits<double>::infinity();
+  for (const MajorantSource& source : sources)
+    if (holds(source)) finest = std::min(finest, finestSpacing(source.localFromNode));
+  const auto octavesOf = [&](const MajorantSource& source) {
+    const double times = finestSpacing(source.localFromNode) / finest;
+    return static_cast<int>(std::clamp(std::floor(std::log2(times * (1 + 1e-6))), 0.0, 30.0));
   };
   if (std::any_of(sources.begin(), sources.end(), [&](const MajorantSource& source) {
         return holds(source) && octavesOf(source) > 0;

@@ -4,6 +4,7 @@
 #include <openvdb/points/PointAttribute.h>
 #include <openvdb/points/PointDataGrid.h>
 
+#include <algorithm>
 #include <cctype>
 #include <cmath>
 #include <cstring>
@@ -169,12 +170,17 @@ void writeAttribute(PointTree& tree, const std::vector<WrittenLeaf>& leaves,
       attribute.data);
 }
 
-// Letters, digits and `_|:` are what OpenVDB accepts. @param taken  names so far, of which none may
-// be another's
+// Letters, digits and `_|:` are what OpenVDB accepts.
+bool isStorable(char c) {
+  return std::isalnum(static_cast<unsigned char>(c)) || (c != 0 && std::strchr("_|:", c));
+}
+
+// @param taken  names of others, and of those that stay as they are
 std::string storedName(const std::string& name, std::set<std::string>& taken) {
+  if (taken.count(name) != 0 && name != "P") return name;
   std::string result = name;
   for (char& c : result)
-    if (!std::isalnum(static_cast<unsigned char>(c)) && !std::strchr("_|:", c)) c = '_';
+    if (!isStorable(c)) c = '_';
   if (result.empty() || result == "P")
     throw ConfigError(fmt::format("a point attribute cannot be named \"{}\"", name));
   while (!taken.insert(result).second)
@@ -212,6 +218,9 @@ Grid pointsToGrid(const ParticleSet& particles, std::string_view name, double vo
   const std::vector<WrittenLeaf> leaves = makeLeaves(*tree, bins);
   writePositions(leaves, bins, particles, *transform);
   std::set<std::string> names;
+  for (const Attribute& attribute : particles.attributes)
+    if (std::all_of(attribute.name.begin(), attribute.name.end(), isStorable))
+      names.insert(attribute.name);
   for (const Attribute& attribute : particles.attributes)
     writeAttribute(*tree, leaves, bins, attribute, storedName(attribute.name, names));
 

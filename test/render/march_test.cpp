@@ -7,6 +7,7 @@
 #include <functional>
 #include <ostream>
 
+#include "photosphere/core/sampling.h"
 #include "support/frames.h"
 #include "support/support.h"
 
@@ -200,6 +201,36 @@ TEST(March, TransmittanceDoesNotDependOnTheStep) {
     EXPECT_NEAR(r.transmittance.x, std::exp(-3.0f), 1e-4f) << step;
     EXPECT_NEAR(r.depth / r.opacity, 8 + (1 - 4 * std::exp(-3.0)) / (1.5 * (1 - std::exp(-3.0))),
                 0.05);
+  }
+}
+
+// Smoke of two voxel sizes: steps change where rays pass from one to the other, at any distance.
+TEST(March, StepsFollowTheVoxelsOfTheirCell) {
+  for (const double ratio : {2.0, 9.0}) {
+    std::vector<transport::MediumVolume> volumes;
+    volumes.push_back(sampledVolume(2.0, 16, {0.8, 0.0, 0.3}, plumeDensity));
+    volumes.push_back(sampledVolume(2.0 / ratio, 16, {0.8, 0.0, 0.3 * ratio}, plumeDensity));
+    const transport::Medium medium(std::move(volumes));
+    const transport::LightList lights;
+    const render::Shadows shadows(medium, lights, ShadowMode::march, 0.1f, 0);
+    render::MarchOptions fine;
+    fine.step = 1.0f / 16;
+    const auto usual = render::makeMarchIntegrator(medium, lights, shadows, nullptr, {});
+    const auto exact = render::makeMarchIntegrator(medium, lights, shadows, nullptr, fine);
+    double all = 0, wanted = 0;
+    IntegratorCounters counters;
+    for (int i = 0; i < (kSanitized ? 2000 : 40000); ++i) {
+      Rng rng(RandomKey::fromSeed(3, 0), RandomStream::camera, static_cast<std::uint64_t>(i));
+      const Vec3d eye = 4.0 * Vec3d(sampleSphere(rng.uniform2()));
+      const Vec3d target =
+          0.7 * (Vec3d(rng.uniformDouble(), rng.uniformDouble(), rng.uniformDouble()) - 0.5);
+      const Vec3f direction(glm::normalize(target - eye));
+      all += 1.0 - static_cast<double>(
+                       usual->radiance(eye, direction, {}, rng, counters).transmittance.x);
+      wanted += 1.0 - static_cast<double>(
+                          exact->radiance(eye, direction, {}, rng, counters).transmittance.x);
+    }
+    EXPECT_NEAR(all / wanted, 1.0, kSanitized ? 0.02 : 0.005) << ratio;
   }
 }
 

@@ -12,8 +12,8 @@ enum class Level { debug, info, warning, error, off };
 
 void setLevel(Level level);
 Level level();
-/// Text with control characters other than line breaks and tabs as \xNN: names come from files,
-/// and must not steer a terminal.
+/// Text with control characters other than line breaks, tabs and delete as \xNN or \u00NN: names
+/// come from files, and must not steer a terminal. JSON stays what it is.
 std::string printable(const std::string& text);
 /// Writes a message, printable.
 void write(Level level, const std::string& text);

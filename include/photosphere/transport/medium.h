@@ -152,8 +152,6 @@ class Medium {
   bool isColoured() const { return m_coloured; }
   /// Extinction of each channel over `extinction`, where that is the same everywhere.
   const Rgb* tint() const { return m_tint ? &*m_tint : nullptr; }
-  /// Most that the thinnest channel has of `extinction`, anywhere; past a quarter it counts as 1.
-  float thinnestChannel() const { return std::min({m_densest.x, m_densest.y, m_densest.z}); }
   /// What the channels that still carry light need of `extinction`, in (0, 1]: none of them is
   /// extinguished faster than that part of it, anywhere.
   /// @param power  of each channel, in any unit

@@ -96,9 +96,12 @@ int renderFrames(const scene::SceneFile& scene, const scene::FrameWriter& writer
   StatsFile stats(options.scene.stats, frames.size());
   bool planned = false;
   const scene::WriteRequest& write = options.write;
+  JobFiles colour;
+  colour.reads("the OCIO config", writer.colorConfig());
+  const std::string config = colour.stamp("");
   const std::string more = fmt::format(
-      "render {} {} {} {} {} {} {} {}", options.crop, write.floatColor, options.compression,
-      write.preview, write.exposure, write.ocioConfig, write.ocioDisplay, write.ocioView);
+      "render {} {} {} {} {} {} {} {} {}", options.crop, write.floatColor, options.compression,
+      write.preview, write.exposure, write.ocioConfig, write.ocioDisplay, write.ocioView, config);
   ResumableJob job =
       resumableJob(scene, options.scene, more, frames, cacheFrames, options.write.path);
   const auto render = [&](std::int64_t frame) {
@@ -120,8 +123,7 @@ int renderFrames(const scene::SceneFile& scene, const scene::FrameWriter& writer
       return printLine("frame {}: {} was finished before the interruption", frame, path);
     }
     if (!smoke)
-      log::warning("frame {}: without smoke: outside the caches' frames (--cache-hold clip)",
-                   frame);
+      log::info("frame {}: without smoke: outside the caches' frames (--cache-hold clip)", frame);
     request.checkpoint = &job.begin(frame);
     const bool reached = renderOne(smoke ? scene : empty, frame, options, request, writer, stats);
     job.finished(frame, !reached);
