@@ -76,15 +76,15 @@ void ResumableJob::readNote(const std::string& note) {
   std::string identity, inputs;
   std::getline(lines, identity);
   if (identity != m_identity) return;
+  const std::set<std::int64_t> ours(m_frames.begin(), m_frames.end());
   std::int64_t frame = 0;
   int missed = 0;
   while (lines >> frame >> inputs >> missed) {
-    if (std::find(m_frames.begin(), m_frames.end(), frame) == m_frames.end()) continue;
+    if (ours.count(frame) == 0) continue;
     if (inputs != m_inputsOf(frame)) {
       log::info("frame {}: what it is made from has changed since the interruption", frame);
       continue;
     }
-    m_earlier.insert(frame);
     m_finished[frame] = inputs;
     if (missed) m_missed.insert(frame);
   }

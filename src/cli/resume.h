@@ -39,8 +39,8 @@ class ResumableJob {
                const std::vector<std::int64_t>& frames, OfFrame outputOf, OfFrame inputsOf);
 
   /// True when the interrupted run had finished this frame, from what it would be made from now;
-  /// its file must still be looked at.
-  bool hadFinished(std::int64_t frame) const { return m_earlier.count(frame) != 0; }
+  /// its file must still be looked at. Asked before the frame begins.
+  bool hadFinished(std::int64_t frame) const { return m_finished.count(frame) != 0; }
   /// Begins a frame. The checkpoint is the job's.
   Checkpoint& begin(std::int64_t frame);
   /// The frame is on disk: its checkpoint is removed. @param missed  it has not reached its target
@@ -61,7 +61,7 @@ class ResumableJob {
   std::string m_identity;
   std::vector<std::int64_t> m_frames;
   OfFrame m_outputOf, m_inputsOf;
-  std::set<std::int64_t> m_earlier, m_missed;
+  std::set<std::int64_t> m_missed;
   std::map<std::int64_t, std::string> m_finished;  // and what they were made from
   std::string m_inputs;                            // of the frame under way
   std::optional<Checkpoint> m_current;

@@ -19,6 +19,9 @@ namespace photosphere::cli {
 
 namespace {
 
+// Among the files of a job.
+constexpr const char* kSceneRole = "the scene";
+
 struct NamedHold {
   std::string_view name;
   CacheHold hold;
@@ -142,12 +145,6 @@ bool CacheFrames::map(std::int64_t frame, std::int64_t& cacheFrame) const {
   cacheFrame = frame + m_offset;
   return !m_hold || mapFrame(cacheFrame, m_first, m_last, *m_hold, cacheFrame);
 }
-
-namespace {
-
-constexpr const char* kSceneRole = "the scene";
-
-}  // namespace
 
 JobFiles filesRead(const scene::SceneFile& scene, const std::vector<std::int64_t>& frames,
                    const CacheFrames& cacheFrames) {

@@ -124,9 +124,8 @@ bool mayBeOurs(const fs::path& path) {
          (name.starts_with('.') && name.find(".tmp-photosphere-") != std::string::npos);
 }
 
-// Whether a file is one that `writeSealed` wrote, or began to.
+// Whether one that may be is a file that `writeSealed` wrote, or began to.
 bool isOurs(const fs::path& path) {
-  if (!mayBeOurs(path)) return false;
   if (path.filename().string().starts_with('.')) return true;
   std::ifstream in(path, std::ios::binary);
   std::string magic(kMagic.size(), '\0');
@@ -248,7 +247,7 @@ void Checkpoint::discard() {
   std::error_code error;
   std::vector<fs::path> ours;
   for (const auto& entry : fs::directory_iterator(m_folder, error))
-    if (isOurs(entry.path())) ours.push_back(entry.path());
+    if (mayBeOurs(entry.path()) && isOurs(entry.path())) ours.push_back(entry.path());
   for (const fs::path& path : ours)
     fs::remove(path, error);
   // What somebody else keeps there stays.

@@ -131,10 +131,10 @@ void ParticleSink::consume(std::span<const Flight> flights) {
           basis.begin(flight, along);
           findTargets(flight.origin + flight.direction * flight.length, targets);
           std::uint32_t counter = 0;
+          const Rgb power = flight.collisionPower();
           for (const Target& target : targets)
-            m_carriers.add(basis, along, flight, target.first, set,
-                           flight.collisionPower() * target.second, m_positions[target.first],
-                           counter);
+            m_carriers.add(basis, along, flight, target.first, set, power * target.second,
+                           m_positions[target.first], counter);
         }
       },
       m_carriers.basis());

@@ -4,7 +4,6 @@
 
 #include <cmath>
 #include <fstream>
-#include <sstream>
 
 #include "photosphere/core/error.h"
 #include "photosphere/core/hash.h"
@@ -14,6 +13,8 @@
 namespace photosphere::scene {
 
 namespace {
+
+constexpr std::size_t kLongestScene = 16 << 20;  // bytes
 
 // What decides pixels is all of a scene but the places of its files and its output.
 enum class DumpPurpose { file, hash };
@@ -181,20 +182,16 @@ SceneFile parseScene(const std::string& text, const std::string& name,
   return scene;
 }
 
-namespace {
-
-constexpr std::size_t kLongestScene = 16 << 20;
-
-}  // namespace
-
 SceneFile loadScene(const std::filesystem::path& path, const std::vector<std::string>& sets) {
   checkReadable(path, "a scene file");
   std::ifstream in(path, std::ios::binary);
+  std::string text;
   // A device may have no end.
-  std::string text(kLongestScene + 1, '\0');
-  in.read(text.data(), static_cast<std::streamsize>(text.size()));
+  for (char block[1 << 14]; in && text.size() <= kLongestScene;) {
+    in.read(block, sizeof block);
+    text.append(block, static_cast<std::size_t>(in.gcount()));
+  }
   if (!in.good() && !in.eof()) throw InputMissingError(path.string(), "cannot be read");
-  text.resize(static_cast<std::size_t>(in.gcount()));
   if (text.size() > kLongestScene)
     throw ConfigError(fmt::format("{}: is longer than {} MiB, and no scene file", path.string(),
                                   kLongestScene >> 20));

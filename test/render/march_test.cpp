@@ -204,6 +204,36 @@ TEST(March, TransmittanceDoesNotDependOnTheStep) {
   }
 }
 
+struct Ray {
+  Vec3d eye;
+  Vec3f direction;
+};
+
+// Opacity that steps of the usual length find, in sum over rays by chance, over that of finer ones.
+template <class RayOf>
+double opacityOverThatOf(float fineStep, const transport::Medium& medium, int rays,
+                         std::uint64_t seed, const RayOf& rayOf) {
+  const transport::LightList lights;
+  const render::Shadows shadows(medium, lights, ShadowMode::march, 0.1f, 0);
+  render::MarchOptions fine;
+  fine.step = fineStep;
+  const auto usual = render::makeMarchIntegrator(medium, lights, shadows, nullptr, {});
+  const auto exact = render::makeMarchIntegrator(medium, lights, shadows, nullptr, fine);
+  double found = 0, wanted = 0;
+  IntegratorCounters counters;
+  for (int i = 0; i < rays; ++i) {
+    Rng rng(RandomKey::fromSeed(seed, 0), RandomStream::camera, static_cast<std::uint64_t>(i));
+    const Ray ray = rayOf(rng);
+    const auto opacity = [&](const render::Integrator& march) {
+      const RayRadiance r = march.radiance(ray.eye, ray.direction, {}, rng, counters);
+      return 1.0 - static_cast<double>(r.transmittance.x);
+    };
+    found += opacity(*usual);
+    wanted += opacity(*exact);
+  }
+  return found / wanted;
+}
+
 // Smoke of two voxel sizes: steps change where rays pass from one to the other, at any distance.
 TEST(March, StepsFollowTheVoxelsOfTheirCell) {
   for (const double ratio : {2.0, 9.0}) {
@@ -211,26 +241,14 @@ TEST(March, StepsFollowTheVoxelsOfTheirCell) {
     volumes.push_back(sampledVolume(2.0, 16, {0.8, 0.0, 0.3}, plumeDensity));
     volumes.push_back(sampledVolume(2.0 / ratio, 16, {0.8, 0.0, 0.3 * ratio}, plumeDensity));
     const transport::Medium medium(std::move(volumes));
-    const transport::LightList lights;
-    const render::Shadows shadows(medium, lights, ShadowMode::march, 0.1f, 0);
-    render::MarchOptions fine;
-    fine.step = 1.0f / 16;
-    const auto usual = render::makeMarchIntegrator(medium, lights, shadows, nullptr, {});
-    const auto exact = render::makeMarchIntegrator(medium, lights, shadows, nullptr, fine);
-    double all = 0, wanted = 0;
-    IntegratorCounters counters;
-    for (int i = 0; i < (kSanitized ? 2000 : 40000); ++i) {
-      Rng rng(RandomKey::fromSeed(3, 0), RandomStream::camera, static_cast<std::uint64_t>(i));
-      const Vec3d eye = 4.0 * Vec3d(sampleSphere(rng.uniform2()));
-      const Vec3d target =
-          0.7 * (Vec3d(rng.uniformDouble(), rng.uniformDouble(), rng.uniformDouble()) - 0.5);
-      const Vec3f direction(glm::normalize(target - eye));
-      all += 1.0 - static_cast<double>(
-                       usual->radiance(eye, direction, {}, rng, counters).transmittance.x);
-      wanted += 1.0 - static_cast<double>(
-                          exact->radiance(eye, direction, {}, rng, counters).transmittance.x);
-    }
-    EXPECT_NEAR(all / wanted, 1.0, kSanitized ? 0.02 : 0.005) << ratio;
+    const double found =
+        opacityOverThatOf(1.0f / 16, medium, kSanitized ? 2000 : 40000, 3, [](Rng& rng) {
+          const Vec3d eye = 4.0 * Vec3d(sampleSphere(rng.uniform2()));
+          const Vec3d target =
+              0.7 * (Vec3d(rng.uniformDouble(), rng.uniformDouble(), rng.uniformDouble()) - 0.5);
+          return Ray{eye, Vec3f(glm::normalize(target - eye))};
+        });
+    EXPECT_NEAR(found, 1.0, kSanitized ? 0.02 : 0.005) << ratio;
   }
 }
 
@@ -242,31 +260,17 @@ TEST(March, FeaturesOfOneVoxelKeepTheirDepth) {
   const auto ball = [](const Vec3d& p) { return glm::length(p) < 0.9 * kVoxel ? 1.0 : 0.0; };
   // Something far behind, so that the bounds end elsewhere.
   const auto beyond = [&](const Vec3d& p) { return glm::length(p + 0.8) < 0.2 ? 1.0 : sheet(p); };
-  const transport::LightList lights;
+  using Shape = std::function<double(const Vec3d&)>;
   int number = 0;
-  for (const std::function<double(const Vec3d&)>& shape :
-       {std::function<double(const Vec3d&)>(sheet), std::function<double(const Vec3d&)>(ball),
-        std::function<double(const Vec3d&)>(beyond)}) {
+  for (const Shape& shape : {Shape(sheet), Shape(ball), Shape(beyond)}) {
     const transport::Medium medium = makeMedium(sampledVolume(2.0, 32, {0.8, 0.0, 0.5}, shape));
-    const render::Shadows shadows(medium, lights, ShadowMode::march, 0.1f, 0);
-    render::MarchOptions fine;
-    fine.step = 1.0f / 64;
-    const auto usual = render::makeMarchIntegrator(medium, lights, shadows, nullptr, {});
-    const auto exact = render::makeMarchIntegrator(medium, lights, shadows, nullptr, fine);
-    double all = 0, wanted = 0;
-    IntegratorCounters counters;
-    for (int i = 0; i < 8000; ++i) {
-      Rng rng(RandomKey::fromSeed(1, 0), RandomStream::camera, static_cast<std::uint64_t>(i));
+    const double found = opacityOverThatOf(1.0f / 64, medium, 8000, 1, [](Rng& rng) {
       const Vec3d target(kVoxel * (rng.uniformDouble() - 0.5), kVoxel * (rng.uniformDouble() - 0.5),
                          0.5 * kVoxel);
       const Vec3d eye(0.7, 0.4, 2.5);
-      const Vec3f direction(glm::normalize(target - eye));
-      for (const auto* march : {&usual, &exact}) {
-        const RayRadiance r = (*march)->radiance(eye, direction, {}, rng, counters);
-        (march == &usual ? all : wanted) += 1.0 - static_cast<double>(r.transmittance.x);
-      }
-    }
-    EXPECT_NEAR(all / wanted, 1.0, 0.01) << "shape " << number;
+      return Ray{eye, Vec3f(glm::normalize(target - eye))};
+    });
+    EXPECT_NEAR(found, 1.0, 0.01) << "shape " << number;
     ++number;
   }
 }

@@ -70,26 +70,35 @@ TEST(ColouredExtinction, PhotonWeightsStayBounded) {
   EXPECT_EQ(stats.majorantViolations, 0u);
 }
 
+// A ray through the unit box.
+const Vec3f kBeside(-0.5f, 0.01f, 0.02f), kAcross(1, 0, 0);
+
+// Tracked through the unit box, whose extinction is even, each channel has the transmittance of its
+// own.
+void expectBeers(const Medium& medium, double densest, const Rgb& tint, int count,
+                 transport::TrackingCounters& counters) {
+  Vec3d sum(0.0);
+  for (int i = 0; i < count; ++i) {
+    Rng rng(RandomKey::fromSeed(2, 0), RandomStream::camera, static_cast<std::uint64_t>(i));
+    sum += Vec3d(transport::trackTransmittance<Rgb>(medium, kBeside, kAcross, 1.0f, rng, counters));
+  }
+  for (int c = 0; c < 3; ++c)
+    EXPECT_NEAR(sum[c] / count, std::exp(-densest * static_cast<double>(tint[c])),
+                4 * 0.5 / std::sqrt(count))
+        << "channel " << c;
+}
+
 TEST(ColouredExtinction, TransmittanceIsBeersOfEachChannel) {
   MediumVolume box = boxVolume(Vec3d(1.0), Vec3i(8), {.extinction = 3.0});
   box.tint = kTint;
   const Medium medium = makeMedium(std::move(box));
   ASSERT_TRUE(medium.tint());
-  const Vec3f o(-0.5f, 0.01f, 0.02f), d(1, 0, 0);
-  const Rgb depth = transport::marchOpticalDepth<Rgb>(medium, o, d, 1.0f, 0.1f);
+  const Rgb depth = transport::marchOpticalDepth<Rgb>(medium, kBeside, kAcross, 1.0f, 0.1f);
   for (int c = 0; c < 3; ++c)
     EXPECT_NEAR(depth[c], 3.0f * kTint[c], 1e-4f);
-  Vec3d sum(0.0);
   const int count = kSanitized ? 2'000 : 40'000;
   transport::TrackingCounters counters;
-  for (int i = 0; i < count; ++i) {
-    Rng rng(RandomKey::fromSeed(2, 0), RandomStream::camera, static_cast<std::uint64_t>(i));
-    sum += Vec3d(transport::trackTransmittance<Rgb>(medium, o, d, 1.0f, rng, counters));
-  }
-  for (int c = 0; c < 3; ++c)
-    EXPECT_NEAR(sum[c] / count, std::exp(-3.0 * static_cast<double>(kTint[c])),
-                4 * 0.5 / std::sqrt(count))
-        << "channel " << c;
+  expectBeers(medium, 3.0, kTint, count, counters);
 }
 
 // Two volumes of different colours have no common one: tables hold three channels.
@@ -147,20 +156,16 @@ TEST(ColouredExtinction, WhiteFurnaceIsOneInEveryChannel) {
 }
 
 // Each channel is what grey smoke of its own extinction is.
-TEST(ColouredExtinction, ChannelsAreThoseOfGreySmoke) {
-  const Rgb albedo(0.95f, 0.8f, 0.99f);
-  const auto lamps = [] {
-    transport::LightList lights;
-    lights.push_back(
-        makeLight("directional", {{"position", "[-1, -0.3, 0.4]"}, {"target", "[0, 0, 0]"}}));
-    return lights;
-  };
-  const Medium coloured = makeMedium(tinted(kTint, 30.0, albedo));
-  const transport::LightList lights = lamps();
+void expectChannelsOfGreySmoke(const Rgb& tint, double densest, const Rgb& albedo,
+                               std::size_t ofLight, std::size_t ofTransmittance) {
+  transport::LightList lights;
+  lights.push_back(
+      makeLight("directional", {{"position", "[-1, -0.3, 0.4]"}, {"target", "[0, 0, 0]"}}));
+  const Medium coloured = makeMedium(tinted(tint, densest, albedo));
   const auto path = render::makePathIntegrator(coloured, lights, {});
   for (int c = 0; c < 3; ++c) {
     const Medium grey =
-        makeMedium(tinted(Rgb(1.0f), 30.0 * static_cast<double>(kTint[c]), Rgb(albedo[c])));
+        makeMedium(tinted(Rgb(1.0f), densest * static_cast<double>(tint[c]), Rgb(albedo[c])));
     const auto alone = render::makePathIntegrator(grey, lights, {});
     const auto light = [c](const render::RayRadiance& r) {
       return static_cast<double>(r.total()[c]);
@@ -169,14 +174,18 @@ TEST(ColouredExtinction, ChannelsAreThoseOfGreySmoke) {
       return static_cast<double>(r.transmittance[c]);
     };
     const Vec3d eye(0.03, -3, 0.05);
-    const Estimate a = estimate(*path, eye, Vec3f(0, 1, 0), 80'000, light);
-    const Estimate b = estimate(*alone, eye, Vec3f(0, 1, 0), 80'000, light);
+    const Estimate a = estimate(*path, eye, Vec3f(0, 1, 0), ofLight, light);
+    const Estimate b = estimate(*alone, eye, Vec3f(0, 1, 0), ofLight, light);
     EXPECT_NEAR(a.mean, b.mean, 4 * std::hypot(a.error, b.error)) << "channel " << c;
     EXPECT_GT(b.mean, 0.0);
-    const Estimate t = estimate(*path, eye, Vec3f(0, 1, 0), 20'000, through);
-    const Estimate u = estimate(*alone, eye, Vec3f(0, 1, 0), 20'000, through);
+    const Estimate t = estimate(*path, eye, Vec3f(0, 1, 0), ofTransmittance, through);
+    const Estimate u = estimate(*alone, eye, Vec3f(0, 1, 0), ofTransmittance, through);
     EXPECT_NEAR(t.mean, u.mean, 4 * std::hypot(t.error, u.error)) << "channel " << c;
   }
+}
+
+TEST(ColouredExtinction, ChannelsAreThoseOfGreySmoke) {
+  expectChannelsOfGreySmoke(kTint, 30.0, Rgb(0.95f, 0.8f, 0.99f), 80'000, 20'000);
 }
 
 // Smoke that is a hundred thousand times as dense to blue as to red.
@@ -188,49 +197,15 @@ TEST(ColouredExtinction, TransmittanceTakesNoStepsForChannelsThatHaveEnded) {
   MediumVolume box = boxVolume(Vec3d(1.0), Vec3i(8), {.extinction = kDensest});
   box.tint = kSteepTint;
   const Medium medium = makeMedium(std::move(box));
-  const Vec3f o(-0.5f, 0.01f, 0.02f), d(1, 0, 0);
-  Vec3d sum(0.0);
   const int count = kSanitized ? 1'000 : 20'000;
   transport::TrackingCounters counters;
-  for (int i = 0; i < count; ++i) {
-    Rng rng(RandomKey::fromSeed(2, 0), RandomStream::camera, static_cast<std::uint64_t>(i));
-    sum += Vec3d(transport::trackTransmittance<Rgb>(medium, o, d, 1.0f, rng, counters));
-  }
-  for (int c = 0; c < 3; ++c)
-    EXPECT_NEAR(sum[c] / count, std::exp(-kDensest * static_cast<double>(kSteepTint[c])),
-                4 * 0.5 / std::sqrt(count))
-        << "channel " << c;
+  expectBeers(medium, kDensest, kSteepTint, count, counters);
   EXPECT_LT(counters.lookups, 5000u * static_cast<unsigned>(count)) << "500,000 at blue's pace";
   EXPECT_EQ(counters.majorantViolations, 0u);
 }
 
 TEST(ColouredExtinction, SteepChannelsAreThoseOfGreySmoke) {
-  const Rgb albedo(0.9f, 0.95f, 0.99f);
-  transport::LightList lights;
-  lights.push_back(
-      makeLight("directional", {{"position", "[-1, -0.3, 0.4]"}, {"target", "[0, 0, 0]"}}));
-  const Medium coloured = makeMedium(tinted(kSteepTint, kDensest, albedo));
-  const auto path = render::makePathIntegrator(coloured, lights, {});
-  for (int c = 0; c < 3; ++c) {
-    const Medium grey = makeMedium(
-        tinted(Rgb(1.0f), kDensest * static_cast<double>(kSteepTint[c]), Rgb(albedo[c])));
-    const auto alone = render::makePathIntegrator(grey, lights, {});
-    const auto light = [c](const render::RayRadiance& r) {
-      return static_cast<double>(r.total()[c]);
-    };
-    const auto through = [c](const render::RayRadiance& r) {
-      return static_cast<double>(r.transmittance[c]);
-    };
-    const Vec3d eye(0.03, -3, 0.05);
-    constexpr std::size_t samples = 4096;
-    const Estimate a = estimate(*path, eye, Vec3f(0, 1, 0), samples, light);
-    const Estimate b = estimate(*alone, eye, Vec3f(0, 1, 0), samples, light);
-    EXPECT_NEAR(a.mean, b.mean, 4 * std::hypot(a.error, b.error)) << "channel " << c;
-    EXPECT_GT(b.mean, 0.0);
-    const Estimate t = estimate(*path, eye, Vec3f(0, 1, 0), samples, through);
-    const Estimate u = estimate(*alone, eye, Vec3f(0, 1, 0), samples, through);
-    EXPECT_NEAR(t.mean, u.mean, 4 * std::hypot(t.error, u.error)) << "channel " << c;
-  }
+  expectChannelsOfGreySmoke(kSteepTint, kDensest, Rgb(0.9f, 0.95f, 0.99f), 4096, 4096);
 }
 
 // Light in all of the smoke, by the length of flights and by their collisions [W m].
