@@ -179,7 +179,9 @@ void checkSeedMemory(std::uint64_t particles) {
         particles, kBytesEach, formatBytes(free), free / kBytesEach));
 }
 
-void addParticles(caches::CacheContent& content, const ConvertOptions& options) {
+/// @param path  of the grids, for messages
+void addParticles(caches::CacheContent& content, const std::string& path,
+                  const ConvertOptions& options) {
   const Grid* density = findGrid(content, options.density);
   if (!density || options.particles == 0) {
     if (!density)
@@ -187,6 +189,11 @@ void addParticles(caches::CacheContent& content, const ConvertOptions& options) 
                    options.density);
     return;
   }
+  if (!density->isAffine())
+    throw InputError(path, fmt::format("grid '{}' has a frustum transform, in which no particles "
+                                       "are seeded; resample it to a regular grid in the software "
+                                       "that wrote it, or give --particles 0 to keep it as it is",
+                                       density->name()));
   checkSeedMemory(options.particles);
   ParticleSet set = volume::seedParticles(*density, options.particles, options.seed);
   double mass = 0;
@@ -218,7 +225,7 @@ void complete(caches::CacheContent& content, const std::string& path, const Conv
               bool gridsCanBeKept) {
   joinParticles(content);
   if (content.particles.empty())
-    addParticles(content, options);
+    addParticles(content, path, options);
   else if (gridsCanBeKept && content.particles.front().size() > 0 &&
            !findGrid(content, options.density))
     addDensity(content, path, options);

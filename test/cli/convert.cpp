@@ -4,6 +4,7 @@
 
 #include "fixture.h"
 #include "photosphere/caches/cache_format.h"
+#include "photosphere/volume/grid_variants.h"
 
 namespace photosphere::test {
 namespace {
@@ -185,6 +186,27 @@ TEST_F(Convert, GoesRoundThroughEveryPointFormat) {
   const caches::CacheContent last = caches::readCache(m_folder / "4.ply");
   ASSERT_EQ(last.particles.size(), 1u);
   expectSameParticles(set, last.particles.front(), 1e-5);
+}
+
+// A channel's name has 32 bytes with its end.
+TEST_F(Convert, SaysWhichAttributesPrtNamesOtherwise) {
+  const std::string name(40, 'a');
+  writeText(m_folder / "in.csv", "x,y,z," + name + ",heat!\n0,0,0,1,2\n1,1,1,3,4\n");
+  const RunResult result = convert({"in.csv", "-o", "out.prt"});
+  ASSERT_EQ(result.exitCode, 0) << result.err;
+  for (const std::string& text :
+       {"attribute '" + name + "' is written as PRT channel '" + name.substr(0, 31) + "'",
+        std::string("attribute 'heat!' is written as PRT channel 'heat_'")})
+    EXPECT_NE(result.err.find(text), std::string::npos) << result.err;
+}
+
+TEST_F(Convert, SeedsNothingInAFrustum) {
+  volume::writeVdb(m_folder / "in.vdb", {volume::inFrustum(ballOfSmoke(0.1))});
+  const RunResult result = convert({"in.vdb", "-o", "out.vdb"});
+  EXPECT_EQ(result.exitCode, 4);
+  EXPECT_NE(result.err.find("in.vdb: grid 'density' has a frustum transform"), std::string::npos)
+      << result.err;
+  EXPECT_EQ(convert({"in.vdb", "-o", "out.vdb", "--particles", "0"}).exitCode, 0);
 }
 
 TEST_F(Convert, LeavesTheOldOutputWhenItFails) {

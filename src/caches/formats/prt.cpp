@@ -12,6 +12,7 @@
 #include "inflate.h"
 #include "photosphere/caches/cache_format.h"
 #include "photosphere/core/error.h"
+#include "photosphere/core/log.h"
 #include "prt_header.h"
 #include "text_number.h"
 
@@ -102,8 +103,9 @@ void putMeta(std::string& out, std::string_view channel, std::string_view name, 
   out.append(body);
 }
 
-/// Krakatoa's channel name for an attribute.
-std::string channelName(const std::string& attribute) {
+/// Krakatoa's channel name for an attribute; one that PRT cannot spell is written as near as may
+/// be, and a warning says so.
+std::string channelName(const std::string& attribute, const std::string& path) {
   static const std::map<std::string, std::string> names = {{"P", "Position"},
                                                            {"v", "Velocity"},
                                                            {"Cd", "Color"},
@@ -119,6 +121,10 @@ std::string channelName(const std::string& attribute) {
   std::string name = attribute.substr(0, kPrtChannelName - 1);
   for (char& c : name)
     if (!((c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9'))) c = '_';
+  if (name != attribute)
+    log::warning(
+        "{}: attribute '{}' is written as PRT channel '{}' (at most {} letters and digits)", path,
+        attribute, name, kPrtChannelName - 1);
   return name;
 }
 
@@ -152,7 +158,7 @@ std::string metadataChunks(const volume::ParticleSet& particles, const CacheCont
 /// Adds a channel to the layout and its record to `list`.
 void addChannel(const std::string& attribute, int arity, Scalar type, RecordLayout& layout,
                 std::string& list, std::set<std::string>& taken, const std::string& path) {
-  const std::string name = channelName(attribute);
+  const std::string name = channelName(attribute, path);
   if (!taken.insert(name).second)
     throw ConfigError(fmt::format("{}: two attributes would be the PRT channel '{}'; rename '{}'",
                                   path, name, attribute));
