@@ -40,19 +40,19 @@ void addResumeOptions(CLI::App& app, ResumeOptions& options) {
 
 ResumableJob::ResumableJob(const ResumeOptions& options, std::string identity,
                            const std::vector<std::int64_t>& frames, OfFrame outputOf,
-                           OfFrame inputsOf)
+                           OfFrame inputsOf, OfFrame madeOf)
     : m_options(options),
       m_when(parseWhen(options.when)),
       m_identity(std::move(identity)),
       m_frames(frames),
       m_outputOf(std::move(outputOf)),
-      m_inputsOf(std::move(inputsOf)) {
+      m_inputsOf(std::move(inputsOf)),
+      m_madeOf(std::move(madeOf)) {
   if (m_when == Resume::never) return;
   bool any = false;
   for (const std::int64_t frame : frames) {
     const auto folder = Checkpoint::folderOf(m_outputOf(frame));
-    std::error_code error;
-    if (!std::filesystem::is_directory(folder, error)) continue;
+    if (!Checkpoint::isIn(folder)) continue;
     any = true;
     if (const auto note = Checkpoint::note(folder)) readNote(*note);
   }
@@ -62,30 +62,32 @@ ResumableJob::ResumableJob(const ResumeOptions& options, std::string identity,
         "there is no checkpoint to go on from; leave --resume require out to start anew");
 }
 
-// The job, then a line for each finished frame: what it was made from, and whether it missed its
-// target.
+// The job, then a line for each finished frame: what it was made from, what it left, and whether it
+// missed its target.
 std::string ResumableJob::note() const {
   std::string text = m_identity + '\n';
-  for (const auto& [frame, inputs] : m_finished)
-    text += fmt::format("{} {} {}\n", frame, inputs, m_missed.count(frame));
+  for (const auto& [frame, files] : m_finished)
+    text += fmt::format("{} {} {}\n", frame, files, m_missed.count(frame));
   return text;
 }
 
 void ResumableJob::readNote(const std::string& note) {
   std::istringstream lines(note);
-  std::string identity, inputs;
+  std::string identity, inputs, made;
   std::getline(lines, identity);
   if (identity != m_identity) return;
   const std::set<std::int64_t> ours(m_frames.begin(), m_frames.end());
   std::int64_t frame = 0;
   int missed = 0;
-  while (lines >> frame >> inputs >> missed) {
+  while (lines >> frame >> inputs >> made >> missed) {
     if (ours.count(frame) == 0) continue;
-    if (inputs != m_inputsOf(frame)) {
-      log::info("frame {}: what it is made from has changed since the interruption", frame);
+    const bool same = inputs == m_inputsOf(frame);
+    if (!same || made != m_madeOf(frame)) {
+      log::info("frame {}: {} has changed since the interruption", frame,
+                same ? "a file that it had left" : "what it is made from");
       continue;
     }
-    m_finished[frame] = inputs;
+    m_finished[frame] = inputs + ' ' + made;
     if (missed) m_missed.insert(frame);
   }
 }
@@ -98,7 +100,7 @@ Checkpoint& ResumableJob::begin(std::int64_t frame) {
 }
 
 void ResumableJob::finished(std::int64_t frame, bool missed) {
-  m_finished[frame] = m_inputs;
+  m_finished[frame] = m_inputs + ' ' + m_madeOf(frame);
   if (missed) m_missed.insert(frame);
   if (m_current) m_current->discard();
   m_current.reset();

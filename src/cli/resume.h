@@ -32,14 +32,16 @@ class ResumableJob {
 
   /// @param identity  of the job: scene and options, on one line; finished frames of another job
   ///                  are made again
-  /// @param inputsOf  says what a frame is made from, in one word: where that is no longer the
-  ///                  same, a finished frame is made again
+  /// @param inputsOf  says what a frame is made from, in one word, and
+  /// @param madeOf    what it has left: where either is no longer the same, a finished frame is
+  ///                  made again
   /// @throws InputMissingError (require) when no output of these frames has a checkpoint
   ResumableJob(const ResumeOptions& options, std::string identity,
-               const std::vector<std::int64_t>& frames, OfFrame outputOf, OfFrame inputsOf);
+               const std::vector<std::int64_t>& frames, OfFrame outputOf, OfFrame inputsOf,
+               OfFrame madeOf);
 
-  /// True when the interrupted run had finished this frame, from what it would be made from now;
-  /// its file must still be looked at. Asked before the frame begins.
+  /// True when the interrupted run had finished this frame, from what it would be made from now,
+  /// and what it left is still there; asked before the frame begins.
   bool hadFinished(std::int64_t frame) const { return m_finished.count(frame) != 0; }
   /// Begins a frame. The checkpoint is the job's.
   Checkpoint& begin(std::int64_t frame);
@@ -60,9 +62,9 @@ class ResumableJob {
   Resume m_when;
   std::string m_identity;
   std::vector<std::int64_t> m_frames;
-  OfFrame m_outputOf, m_inputsOf;
+  OfFrame m_outputOf, m_inputsOf, m_madeOf;
   std::set<std::int64_t> m_missed;
-  std::map<std::int64_t, std::string> m_finished;  // and what they were made from
+  std::map<std::int64_t, std::string> m_finished;  // what they were made from, what they left
   std::string m_inputs;                            // of the frame under way
   std::optional<Checkpoint> m_current;
 };

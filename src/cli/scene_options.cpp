@@ -169,17 +169,23 @@ JobFiles filesRead(const scene::SceneFile& scene, const std::vector<std::int64_t
 
 ResumableJob resumableJob(const scene::SceneFile& scene, const SceneOptions& options,
                           const std::string& more, const std::vector<std::int64_t>& frames,
-                          const CacheFrames& cacheFrames, const std::string& output) {
+                          const CacheFrames& cacheFrames, const std::vector<std::string>& outputs) {
   // All that the scene says, of the output as well.
   Hasher job;
   job.text(scene::dumpScene(scene));
   job.text(fmt::format("{} {} {} {} {}", options.cacheOffset, options.cacheHold, options.allowStale,
                        options.stats, more));
   return {options.resume, fmt::format("{} {}", buildText(), job.hex()), frames,
-          [output](std::int64_t frame) { return framePath(output, frame); },
+          [outputs](std::int64_t frame) { return framePath(outputs.front(), frame); },
           // A scene that was written anew says the same: that counts, and not its file.
           [&scene, cacheFrames](std::int64_t frame) {
             return filesRead(scene, {frame}, cacheFrames).stamp(kSceneRole);
+          },
+          [outputs](std::int64_t frame) {
+            JobFiles made;
+            for (const std::string& output : outputs)
+              made.reads("output", output, {frame});
+            return made.stamp("");
           }};
 }
 

@@ -59,10 +59,12 @@ class CacheFrames {
 JobFiles filesRead(const scene::SceneFile& scene, const std::vector<std::int64_t>& frames,
                    const CacheFrames& cacheFrames);
 
-/// The job that makes these frames. @param more  what decides its outputs beside the scene
+/// The job that makes these frames.
+/// @param more     what decides its outputs beside the scene
+/// @param outputs  patterns of what each frame leaves, its own first; an empty one is fine
 ResumableJob resumableJob(const scene::SceneFile& scene, const SceneOptions& options,
                           const std::string& more, const std::vector<std::int64_t>& frames,
-                          const CacheFrames& cacheFrames, const std::string& output);
+                          const CacheFrames& cacheFrames, const std::vector<std::string>& outputs);
 
 /// What --dry-run prints of the first frame: what would be simulated, and the memory for it.
 /// @throws what scene::setUpFrame throws

@@ -135,6 +135,14 @@ bool isOurs(const fs::path& path) {
   return kMagic.starts_with(read) || read.find_first_not_of('\0') == std::string_view::npos;
 }
 
+std::vector<fs::path> oursIn(const fs::path& folder) {
+  std::error_code error;
+  std::vector<fs::path> ours;
+  for (const auto& entry : fs::directory_iterator(folder, error))
+    if (mayBeOurs(entry.path()) && isOurs(entry.path())) ours.push_back(entry.path());
+  return ours;
+}
+
 }  // namespace
 
 void StateReader::fail() const {
@@ -238,17 +246,16 @@ std::optional<std::string> Checkpoint::note(const fs::path& folder) {
   return kept->text();
 }
 
-bool Checkpoint::exists() const {
-  std::error_code error;
-  return fs::is_directory(m_folder, error);
+bool Checkpoint::isIn(const fs::path& folder) {
+  const std::vector<fs::path> ours = oursIn(folder);
+  return std::any_of(ours.begin(), ours.end(), [](const fs::path& path) {
+    return !path.filename().string().starts_with('.');
+  });
 }
 
 void Checkpoint::discard() {
   std::error_code error;
-  std::vector<fs::path> ours;
-  for (const auto& entry : fs::directory_iterator(m_folder, error))
-    if (mayBeOurs(entry.path()) && isOurs(entry.path())) ours.push_back(entry.path());
-  for (const fs::path& path : ours)
+  for (const fs::path& path : oursIn(m_folder))
     fs::remove(path, error);
   // What somebody else keeps there stays.
   if (isFolder(m_folder)) fs::remove(m_folder, error);

@@ -141,7 +141,8 @@ class MarchIntegrator final : public Integrator {
       if (!(walk.majorant() > 0.0f) && !(m_emission && m_emission->inCell(walk.cell()))) continue;
       throwIfInterrupted();
       const float end = walk.end();
-      const float majorant = walk.majorant() * livingShare(m_medium, transmittance);
+      const float share = livingShare(m_medium, transmittance);
+      const float majorant = walk.majorant() * share;
       if (majorant > m_thick) {
         const MarchStep rest{ray, std::max(done, walk.begin()), end};
         if (!marchThick(rest, walk.majorant(), extinction, when, transmittance, opacity, result,
@@ -150,18 +151,8 @@ class MarchIntegrator final : public Integrator {
         done = std::max(done, end);
         continue;
       }
-      // The source inside a step varies by the extinction of the light on its way in, which the
-      // midpoint rule sees to (depth)^2 / 24: dense smoke takes finer steps, in powers of two of
-      // one lattice. Where all voxels are coarser steps may be as long as those, at most.
-      const float coarseness = m_emission ? 1.0f : m_medium.majorants().coarseness(walk.cell());
-      float coarser = coarseness;
-      while (coarser > 1.0f && m_step * coarser > m_voxel * coarseness)
-        coarser *= 0.5f;
-      float h = m_step * coarser, perLength = m_stepsPerLength / coarser;
-      while (h * majorant > kStepDepth && h > m_step * kFinest) {
-        h *= 0.5f;
-        perLength *= 2.0f;
-      }
+      const CellStep cell = stepIn(walk.cell(), majorant);
+      const float h = cell.length;
       Vec3f carrier(0.0f);  // read where smoke moves
       const auto rises = [&](float from, float to) {
         return isFoot(extinctionAt(extinction, ray, from, when, carrier),
@@ -171,19 +162,19 @@ class MarchIntegrator final : public Integrator {
       float t0 = std::max(done, walk.begin());
       // The next point of the step lattice beyond t0; a step may run on past the cell, where the
       // following cell then begins later.
-      double k = std::floor(static_cast<double>(t0) * static_cast<double>(perLength) -
+      double k = std::floor(static_cast<double>(t0) * static_cast<double>(cell.perLength) -
                             static_cast<double>(offset)) +
                  1.0;
       const auto place = [&](double number) {
         return static_cast<float>((number + static_cast<double>(offset)) * static_cast<double>(h));
       };
       // Else features are shorter than steps.
-      const bool whole = h <= coarseness * m_voxel;
+      const bool whole = h <= cell.coarseness * m_voxel;
       if (whole && done < t0 && rises(t0 + kBeside * h, 0.5f * (t0 + place(k))))
         t0 = std::max(done, place(k - 1.0));
       for (; t0 < end; k += 1.0) {
         float t1 = place(k);
-        const float cut = coarseness > 1.0f ? upToFiner(walk, t1, coarseness) : t1;
+        const float cut = cell.coarseness > 1.0f ? upToFiner(walk, t1, h, share) : t1;
         const bool atFiner = cut < t1;
         t1 = cut;
         if (t1 > ray.length &&
@@ -213,10 +204,36 @@ class MarchIntegrator final : public Integrator {
     return maxComponent(m_medium.emitted(ray.origin + ray.direction * t, when));
   }
 
-  // A step of some coarseness, unless it would run on into a cell of finer voxels: up to that.
-  float upToFiner(volume::MajorantGrid::Walk walk, float t1, float coarseness) const {
-    for (; !walk.done() && walk.begin() < t1; walk.advance())
-      if (m_medium.majorants().coarseness(walk.cell()) < coarseness) return walk.begin();
+  // Steps in a cell.
+  struct CellStep {
+    float coarseness;  // of its voxels, MajorantGrid::coarseness
+    float length;      // [m]
+    float perLength;   // its inverse
+  };
+  // The source inside a step varies by the extinction of the light on its way in, which the
+  // midpoint rule sees to (depth)^2 / 24: dense smoke takes finer steps, in powers of two of one
+  // lattice. Where all voxels are coarser steps may be as long as those, at most.
+  // @param majorant  of the light that is left
+  CellStep stepIn(std::size_t cell, float majorant) const {
+    const float coarseness = m_emission ? 1.0f : m_medium.majorants().coarseness(cell);
+    float coarser = coarseness;
+    while (coarser > 1.0f && m_step * coarser > m_voxel * coarseness)
+      coarser *= 0.5f;
+    CellStep step{coarseness, m_step * coarser, m_stepsPerLength / coarser};
+    while (step.length * majorant > kStepDepth && step.length > m_step * kFinest) {
+      step.length *= 0.5f;
+      step.perLength *= 2.0f;
+    }
+    return step;
+  }
+
+  // A step of length `h` from a cell of coarse voxels, many of which such a step may pass: up to
+  // the next where steps are shorter.
+  float upToFiner(volume::MajorantGrid::Walk walk, float t1, float h, float share) const {
+    for (; !walk.done() && walk.begin() < t1; walk.advance()) {
+      const float majorant = walk.majorant() * share;
+      if (majorant > m_thick || stepIn(walk.cell(), majorant).length < h) return walk.begin();
+    }
     return t1;
   }
 

@@ -162,7 +162,7 @@ class PathIntegrator final : public Integrator {
   // `throughput` is as of collisions at the rate of `extinction`.
   void addDepth(RayRadiance& result, const Rgb& throughput, float distance, const Vec3f& p,
                 float extinction, When when) const {
-    float met = 1.0f;
+    float met = meanComponent(throughput);
     if constexpr (!std::is_same_v<Light, float>)
       met = meanComponent(throughput * m_medium.channels(p, extinction, when)) / extinction;
     result.depth += met * distance;

@@ -462,6 +462,43 @@ TEST_F(Interrupted, FinishedFramesOfWhatHasChangedAreMadeAgain) {
   EXPECT_TRUE(madeAgain("")) << "other smoke";
 }
 
+// Nor those that another command has written over, or whose preview is gone.
+TEST_F(Interrupted, FinishedFramesThatAreNoLongerThereAreMadeAgain) {
+  const std::string other =
+      "render scene.toml -o x.0001.exr --float --frames 1 -s estimator.type=path_traced -s "
+      "estimator.samples=4";
+  const std::string job =
+      "render scene.toml -o x.####.exr --float --preview p.####.png --frames 1-2 -s "
+      "estimator.type=path_traced -s estimator.samples=400";
+  const auto line = [&](const std::string& arguments) {
+    return runShell(std::string(PHOTOSPHERE_TOOL) + " " + arguments, m_folder.path());
+  };
+  ASSERT_EQ(signalAt(job, "p.0001.png").exitCode, 75);
+  ASSERT_EQ(line(other).exitCode, 0);
+  RunResult result = line(job);
+  EXPECT_EQ(result.exitCode, 0) << result.err;
+  EXPECT_EQ(result.out.find("x.0001.exr was finished before"), std::string::npos) << result.out;
+  EXPECT_NE(result.err.find("frame 1: a file that it had left has changed"), std::string::npos)
+      << result.err;
+  for (const char* name : {"x.0001.exr", "p.0001.png"})
+    fs::remove(m_folder / name);
+  ASSERT_EQ(signalAt(job, "p.0001.png").exitCode, 75);
+  fs::remove(m_folder / "p.0001.png");
+  result = line(job);
+  EXPECT_EQ(result.exitCode, 0) << result.err;
+  EXPECT_TRUE(fs::exists(m_folder / "p.0001.png"));
+}
+
+// A folder of that name is none of ours for its name.
+TEST_F(Interrupted, OthersFilesAreNoCheckpoint) {
+  fs::create_directory(m_folder / "x.exr.checkpoint");
+  writeText(m_folder / "x.exr.checkpoint" / "notes.txt", "mine");
+  EXPECT_EQ(
+      run({"render", "scene.toml", "-o", "x.exr", "--frames", "1", "--resume", "require"}).exitCode,
+      3);
+  EXPECT_EQ(readText(m_folder / "x.exr.checkpoint" / "notes.txt"), "mine");
+}
+
 TEST_F(Interrupted, FiguresThatWereDamagedMeanwhileAreMissed) {
   const std::string job =
       "render scene.toml -o x.####.exr --stats s.json --float --frames 1-2 -s "

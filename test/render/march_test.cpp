@@ -252,6 +252,40 @@ TEST(March, StepsFollowTheVoxelsOfTheirCell) {
   }
 }
 
+// A dense ball in a thin halo, of voxels many times as wide as those of a wisp beside the rays:
+// steps as long as the halo takes end where the ball begins. Lit along the ray, of which single
+// scattering leaves (1 - T^2) / 2.
+TEST(March, CoarseStepsEndWhereSmokeIsDenser) {
+  constexpr double kAlbedo = 0.8;
+  for (const double depth : {2.0, 20.0}) {  // of a voxel
+    std::vector<transport::MediumVolume> volumes;
+    volumes.push_back(sampledVolume(2.0, 32, {kAlbedo, 0.0, depth * 16}, [](const Vec3d& p) {
+      return glm::length(p) < 0.7 ? 1.0 : glm::length(p) < 0.95 ? 2e-4 : 0.0;
+    }));
+    volumes.push_back(sampledVolume(0.25, 128, {kAlbedo, 0.0, 1.0}, [](const Vec3d& p) {
+      return glm::length(p) < 0.1 ? 1.0 : 0.0;
+    }));
+    const transport::Medium medium(std::move(volumes));
+    transport::LightList lights;
+    lights.push_back(
+        makeLight("directional", {{"position", "[0, 0, 9]"}, {"target", "[0, 0, 0]"}}));
+    const render::Shadows shadows(medium, lights, ShadowMode::track, 0.1f, 0);
+    const auto march = render::makeMarchIntegrator(medium, lights, shadows, nullptr, {});
+    double found = 0, wanted = 0;
+    IntegratorCounters counters;
+    for (int i = 0; i < (kSanitized ? 20 : 2000); ++i) {
+      Rng rng(RandomKey::fromSeed(4, 0), RandomStream::camera, static_cast<std::uint64_t>(i));
+      const double across = 0.3 + 0.3 * rng.uniformDouble(), angle = 2 * kPi * rng.uniformDouble();
+      const Vec3d eye(across * std::cos(angle), across * std::sin(angle), 5.0);
+      const RayRadiance r = march->radiance(eye, Vec3f(0, 0, -1), {}, rng, counters);
+      const auto t = static_cast<double>(r.transmittance.x);
+      found += static_cast<double>(r.single.x);
+      wanted += kAlbedo / (4 * kPi) * (1 - t * t) / 2;
+    }
+    EXPECT_NEAR(found / wanted, 1.0, kSanitized ? 0.2 : 0.02) << depth;
+  }
+}
+
 // A sheet and a ball one voxel thick, along rays that cross nodes anywhere: as much smoke on the
 // mean of all offsets of the steps as the finest ones find, whichever way its bounds cut them off.
 TEST(March, FeaturesOfOneVoxelKeepTheirDepth) {

@@ -88,6 +88,26 @@ TEST(PathTracing, TransmittanceFollowsBeerAndLambert) {
   EXPECT_NEAR(oblique.mean, std::exp(-1.5 * std::sqrt(2.0)), 4 * oblique.error + 1e-6);
 }
 
+// A pixel's depth is where what it shows is, so rays count by their opacity, in thin smoke too.
+TEST(PathTracing, DepthCountsByOpacity) {
+  const transport::LightList lights;
+  for (const double sigma : {0.02, 1.5}) {
+    const transport::Medium medium =
+        makeMedium(boxVolume(Vec3d(2.0), Vec3i(16), {0.0, 0.0, sigma}));
+    const auto path = render::makePathIntegrator(medium, lights, {});
+    const auto meanOf = [&](float RayRadiance::*value) {
+      return estimate(*path, {-5, 0.1, 0.2}, {1, 0, 0}, 20000,
+                      [value](const RayRadiance& r) { return static_cast<double>(r.*value); });
+    };
+    const double passed = std::exp(-2 * sigma);
+    const Estimate opacity = meanOf(&RayRadiance::opacity);
+    EXPECT_NEAR(opacity.mean, 1 - passed, 4 * opacity.error + 1e-6) << sigma;
+    const Estimate depth = meanOf(&RayRadiance::depth);
+    const double exact = 4 * (1 - passed) + (1 - passed) / sigma - 2 * passed;
+    EXPECT_NEAR(depth.mean, exact, 4 * depth.error + 1e-6) << sigma;
+  }
+}
+
 struct RadianceCase {
   double tau, albedo, g;
 };

@@ -118,8 +118,10 @@ class Checkpoint {
   /// The text that an earlier run kept, or nothing.
   static std::optional<std::string> note(const std::filesystem::path& folder);
 
+  /// Whether a folder holds what a run kept.
+  static bool isIn(const std::filesystem::path& folder);
   /// True once something was kept or found that a further run can go on from.
-  bool exists() const;
+  bool exists() const { return isIn(m_folder); }
   const std::filesystem::path& folder() const { return m_folder; }
   /// The work is done: removes what was kept, and the folder unless it holds something else.
   void discard();

@@ -103,7 +103,7 @@ int renderFrames(const scene::SceneFile& scene, const scene::FrameWriter& writer
       "render {} {} {} {} {} {} {} {} {}", options.crop, write.floatColor, options.compression,
       write.preview, write.exposure, write.ocioConfig, write.ocioDisplay, write.ocioView, config);
   ResumableJob job =
-      resumableJob(scene, options.scene, more, frames, cacheFrames, options.write.path);
+      resumableJob(scene, options.scene, more, frames, cacheFrames, {write.path, write.preview});
   const auto render = [&](std::int64_t frame) {
     const std::string path = framePath(options.write.path, frame);
     if (options.scene.frames.skipExisting && image::exrIsComplete(path))

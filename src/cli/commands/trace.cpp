@@ -59,7 +59,7 @@ int traceFrames(const scene::SceneFile& scene, const TraceArguments& options) {
   StatsFile stats(options.scene.stats, frames.size());
   bool planned = false;
   ResumableJob job = resumableJob(scene, options.scene, "trace " + options.shardText, frames,
-                                  cacheFrames, options.output);
+                                  cacheFrames, {options.output});
   const auto trace = [&](std::int64_t frame) {
     const std::string path = framePath(options.output, frame);
     if (options.scene.frames.skipExisting && vdbIsComplete(path))
