@@ -114,7 +114,9 @@ FrameSetup setUpAbout(const std::optional<Vec3d>& center, const SceneFile& scene
   const std::int64_t seed = options.seed.value_or(scene.scene.integer("seed"));
   setup.key = RandomKey::fromSeed(static_cast<std::uint64_t>(seed),
                                   scene.scene.flag("seed_per_frame") ? frame : 0);
-  if (scene.render.real("target_error") > 0 || scene.render.real("time_limit") > 0)
+  // Stored light is of all photons: none of its parts is judged.
+  if (!options.forLightCache &&
+      (scene.render.real("target_error") > 0 || scene.render.real("time_limit") > 0))
     setup.batches = kErrorBatches;
   setup.lightPaths =
       scene.estimator.text("type") == "light_traced" && setup.effects.multipleScattering;

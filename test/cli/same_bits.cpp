@@ -274,6 +274,17 @@ TEST_F(Shards, SumsCountsAndPowers) {
               number(all.substr(all.find("energy_watts")), "emitted"), 1e-9);
 }
 
+// However frames are to be judged, light that is kept is of all photons.
+TEST_F(Shards, HaveAllPhotonsWhateverFramesAreJudgedBy) {
+  for (const char* judged : {"render.target_error=0.1", "render.time_limit=100"}) {
+    ASSERT_EQ(run({"trace", "scene.toml", "-o", "l.vdb", "--frames", "1", "--stats", "s.json", "-s",
+                   "estimator.photons=7000", "-s", judged})
+                  .exitCode,
+              0);
+    EXPECT_NE(readText(m_folder / "s.json").find("\"emitted\": 7000"), std::string::npos) << judged;
+  }
+}
+
 TEST_F(Shards, MissingTwiceOrForeignOnesAreRefused) {
   const auto files = trace(3);
   RunResult result = merge({files[0], files[2]});
