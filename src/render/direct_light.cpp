@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "instances.h"
 #include "photosphere/transport/scatter.h"
@@ -13,16 +14,37 @@ namespace {
 using transport::Coefficients;
 using transport::Medium;
 
-// Mean of 1/d^2 over the step, over its value at the middle: the integral has a closed form (the
-// substitution of equiangular sampling), so a lamp inside the smoke costs no subdivision.
-float nearLampFactor(const MarchStep& step, const Vec3f& p, const lights::Illumination& in) {
-  const Vec3f lamp = p - in.direction * in.distance;
-  const float along = glm::dot(lamp - step.ray.origin, step.ray.direction);
-  const Vec3f foot = step.ray.origin + step.ray.direction * along;
-  const Vec3f across = lamp - foot;
-  const float h = std::max(std::sqrt(glm::dot(across, across)), 1e-6f * in.distance + 1e-20f);
-  const float angle = std::atan((step.t1 - along) / h) - std::atan((step.t0 - along) / h);
-  return angle / (h * (step.t1 - step.t0)) * in.distance * in.distance;
+// Steps to a lamp, below which its light changes much within one.
+constexpr float kNear = 8.0f;
+
+// A point of a step, and what stands for the rest of it.
+struct Drawn {
+  Vec3f p;
+  float weight;  // times the squared distance of `p`, softened by the lamp's extent [m^-2]
+};
+
+// Equiangular sampling (Kulla and Fajardo 2012): toward the lamp rather than away from it, as its
+// light is, whose 1/d^2 then cancels. Nothing where the lamp is many steps away or many steps wide:
+// the middle does.
+// @param extent  of the lamp about its center [m]
+std::optional<Drawn> drawNear(const MarchStep& step, const Vec3f& p, const Vec3f& center,
+                              float extent, Rng& rng) {
+  const float length = step.t1 - step.t0;
+  const Vec3f away = p - center;
+  const float reach = kNear * length;
+  if (!(extent < reach && glm::dot(away, away) < (reach + extent) * (reach + extent)))
+    return std::nullopt;
+  const float along = glm::dot(center - step.ray.origin, step.ray.direction);
+  const Vec3f across = center - (step.ray.origin + step.ray.direction * along);
+  const float h =
+      std::max(std::sqrt(glm::dot(across, across) + extent * extent), 1e-6f * reach + 1e-20f);
+  // The step is seen from `h` beside its line under this angle, of which a part is drawn.
+  const float a = step.t0 - along, b = step.t1 - along;
+  const float angle = std::atan2(h * length, h * h + a * b);
+  const float part = rng.uniform() * angle;
+  const float x = std::cos(part), y = std::sin(part);
+  const float s = glm::clamp(h * (a * x + h * y) / (h * x - a * y), a, b);
+  return Drawn{step.ray.origin + step.ray.direction * (along + s), angle / (h * length)};
 }
 
 }  // namespace
@@ -31,6 +53,12 @@ DirectLight::DirectLight(const Medium& medium, const transport::LightList& light
                          const Shadows& shadows, bool useShadows, bool carried)
     : m_medium(medium), m_lights(lights), m_shadows(shadows), m_useShadows(useShadows) {
   std::vector<const lights::Light*> lamps;
+  for (const auto& light : lights) {
+    const std::optional<lights::Place> place = light->place();
+    m_places.push_back(
+        place ? std::optional<Place>(Place{Vec3f(place->center), static_cast<float>(place->extent)})
+              : std::nullopt);
+  }
   for (std::size_t i = 0; i < lights.size(); ++i)
     if (lights[i]->isDelta() || !carried) {
       m_lamps.push_back(i);
@@ -52,12 +80,20 @@ Rgb DirectLight::of(std::size_t i, const Vec3f& p, const Vec3f& wo, const Coeffi
                     When when) const {
   const lights::Light& light = *m_lights[i];
   const Vec2f u = light.isDelta() ? Vec2f(0.5f) : rng.uniform2();
-  lights::Illumination in = light.illuminate(p, u);
+  const std::optional<Place>& place = m_places[i];
+  std::optional<Drawn> drawn;
+  if (step && place) drawn = drawNear(*step, p, place->center, place->extent, rng);
+  const Vec3f at = drawn ? drawn->p : p;
+  lights::Illumination in = light.illuminate(at, u);
   if (!(maxComponent(in.irradiance) > 0.0f)) return Rgb(0.0f);
-  if (step && in.distance < 8.0f * (step->t1 - step->t0))
-    in.irradiance *= nearLampFactor(*step, p, in);
+  if (drawn) {
+    const Vec3f away = at - place->center;
+    const float square = light.isDelta() ? in.distance * in.distance
+                                         : glm::dot(away, away) + place->extent * place->extent;
+    in.irradiance *= drawn->weight * square;
+  }
   const Light visible = m_useShadows
-                            ? m_shadows.transmittance<Light>(i, p, in.direction, in.distance, rng,
+                            ? m_shadows.transmittance<Light>(i, at, in.direction, in.distance, rng,
                                                              counters.tracking, when)
                             : Light(1.0f);
   return transport::scatteringToward(m_medium, c, in.direction, wo) * in.irradiance * visible;

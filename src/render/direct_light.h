@@ -3,6 +3,7 @@
 // frame's shadows.
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "lamp_choice.h"
@@ -30,7 +31,8 @@ class DirectLight {
 
   /// Light scattered at `p` toward `wo` [W m^-3 sr^-1]: of every lamp, or, where there are more
   /// than LampChoice::kFew, its unbiased estimate from a few of them. Where `p` is the middle of a
-  /// march step, a near lamp's 1/d^2 is averaged over the step.
+  /// march step, the light of a near lamp is that of a random point of the step in its stead: its
+  /// mean over the step is right, however 1/d^2, direction and shadow change within it.
   /// @tparam Light  of transmittances: float, or Rgb where extinction differs from channel to
   ///                channel
   template <class Light, class When>
@@ -38,6 +40,11 @@ class DirectLight {
          Rng& rng, IntegratorCounters& counters, When when) const;
 
  private:
+  struct Place {  // lights::Place
+    Vec3f center;
+    float extent;
+  };
+
   template <class Light, class When>
   Rgb of(std::size_t light, const Vec3f& p, const Vec3f& wo, const transport::Coefficients& c,
          const MarchStep* step, Rng& rng, IntegratorCounters& counters, When when) const;
@@ -46,6 +53,7 @@ class DirectLight {
   const transport::LightList& m_lights;
   const Shadows& m_shadows;
   bool m_useShadows;
+  std::vector<std::optional<Place>> m_places;  // by light; nothing = far away
   std::vector<std::size_t> m_lamps;
   std::shared_ptr<const LampChoice> m_choice;  // of many lamps
 };

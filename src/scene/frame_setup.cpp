@@ -52,11 +52,12 @@ SceneFile sceneOfFrame(const SceneFile& written, std::int64_t frame, const Setup
 }
 
 // Of light that this frame stores itself; what a cache holds is known when it is read.
-void noteCoarseLight(const SceneFile& scene, FrameSetup& setup) {
+void noteCoarseLight(const SceneFile& scene, bool forLightCache, FrameSetup& setup) {
   if (scene.estimator.text("type") != "photosphere" || !scene.estimator.text("cache").empty() ||
       !setup.effects.multipleScattering || setup.medium->bounds().empty())
     return;
   noteCoarseDirections(setup);
+  if (!forLightCache) noteEyeInSmoke(setup);
   noteFewCarriers(setup);
 }
 
@@ -110,7 +111,7 @@ FrameSetup setUpAbout(const std::optional<Vec3d>& center, const SceneFile& scene
   planEffects(scene, options.forLightCache || !scene.estimator.text("cache").empty(), setup);
   viewFromTheMiddle(setup);
   chooseLayout(scene, options.forLightCache, setup);
-  noteCoarseLight(scene, setup);
+  noteCoarseLight(scene, options.forLightCache, setup);
   const std::int64_t seed = options.seed.value_or(scene.scene.integer("seed"));
   setup.key = RandomKey::fromSeed(static_cast<std::uint64_t>(seed),
                                   scene.scene.flag("seed_per_frame") ? frame : 0);

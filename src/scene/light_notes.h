@@ -12,6 +12,11 @@ double sharpestLobe(const transport::Medium& medium);
 /// into it shows all over a bin.
 void noteCoarseDirections(FrameSetup& setup);
 
+/// Adds a note where the eye is in smoke that scatters into a lobe, and light is resolved for it:
+/// across the light voxels next to it the direction that it sees them in changes more than the lobe
+/// is wide.
+void noteEyeInSmoke(FrameSetup& setup);
+
 /// Adds a note where fewer particles carry light than one look-up takes.
 void noteFewCarriers(FrameSetup& setup);
 

@@ -8,6 +8,7 @@
 #include <ostream>
 
 #include "photosphere/core/sampling.h"
+#include "support/estimate.h"
 #include "support/frames.h"
 #include "support/support.h"
 
@@ -328,6 +329,38 @@ TEST(March, LampNearTheRayMatchesTheClosedForm) {
     const double exact = sigma * albedo / (4 * kPi) * angle / height;
     EXPECT_NEAR(static_cast<double>(r.single.x), exact, 0.005 * exact) << height;
   }
+}
+
+// The same where smoke scatters forward, of points and of lamps of a step's size: how much of the
+// light turns to the eye changes within a step as 1/d^2 does.
+TEST(March, LampNearTheRayIsThatOfPathsWhereSmokeScattersForward) {
+  constexpr double sigma = 1e-3;
+  const transport::Medium medium = makeMedium(boxVolume(Vec3d(2.0), Vec3i(16), {0.8, 0.8, sigma}));
+  for (const char* type : {"point", "sphere", "disk"})
+    for (const double height : {0.3, 0.05}) {
+      std::vector<std::pair<std::string, std::string>> row{
+          {"position", fmt::format("[0.21, {}, 0.2]", 0.1 + height)}, {"intensity", "1"}};
+      if (type != std::string("point")) row.emplace_back("radius", "0.06");
+      if (type == std::string("disk")) row.emplace_back("target", "[-0.3, 0, 0.2]");
+      transport::LightList lights;
+      lights.push_back(makeLight(type, row));
+      const render::Shadows shadows(medium, lights, ShadowMode::march, 0.1f, 0);
+      const auto march = render::makeMarchIntegrator(medium, lights, shadows, nullptr, {});
+      render::PathOptions once;
+      once.maxScatter = 1;
+      const auto path = render::makePathIntegrator(medium, lights, once);
+      const auto single = [](const RayRadiance& r) { return static_cast<double>(r.single.x); };
+      const Vec3d eye(-9, 0.1, 0.2);
+      const Vec3f along(1, 0, 0);
+      const Estimate found = estimate(*march, eye, along, 20'000, single);
+      const Estimate wanted = estimate(*path, eye, along, 200'000, single);
+      EXPECT_NEAR(found.mean, wanted.mean, 4 * std::hypot(found.error, wanted.error))
+          << type << " " << height;
+      if (!kSanitized) {
+        EXPECT_LT(std::hypot(found.error, wanted.error), 0.01 * wanted.mean)
+            << type << " " << height;
+      }
+    }
 }
 
 // Eye and lamp inside the smoke, where 1/d^2 and directions change quickly.
