@@ -17,7 +17,7 @@ using transport::Medium;
 // Steps to a lamp, below which its light changes much within one.
 constexpr float kNear = 8.0f;
 
-// A point of a step, and what stands for the rest of it.
+// A point of a step, and what the light there stands for.
 struct Drawn {
   Vec3f p;
   float weight;  // times the squared distance of `p`, softened by the lamp's extent [m^-2]
@@ -26,9 +26,10 @@ struct Drawn {
 // Equiangular sampling (Kulla and Fajardo 2012): toward the lamp rather than away from it, as its
 // light is, whose 1/d^2 then cancels. Nothing where the lamp is many steps away or many steps wide:
 // the middle does.
-// @param extent  of the lamp about its center [m]
-std::optional<Drawn> drawNear(const MarchStep& step, const Vec3f& p, const Vec3f& center,
-                              float extent, Rng& rng) {
+std::optional<Drawn> drawNear(const MarchStep& step, const Vec3f& p, const lights::Place& lamp,
+                              Rng& rng) {
+  const Vec3f center(lamp.center);
+  const auto extent = static_cast<float>(lamp.extent);
   const float length = step.t1 - step.t0;
   const Vec3f away = p - center;
   const float reach = kNear * length;
@@ -53,17 +54,13 @@ DirectLight::DirectLight(const Medium& medium, const transport::LightList& light
                          const Shadows& shadows, bool useShadows, bool carried)
     : m_medium(medium), m_lights(lights), m_shadows(shadows), m_useShadows(useShadows) {
   std::vector<const lights::Light*> lamps;
-  for (const auto& light : lights) {
-    const std::optional<lights::Place> place = light->place();
-    m_places.push_back(
-        place ? std::optional<Place>(Place{Vec3f(place->center), static_cast<float>(place->extent)})
-              : std::nullopt);
-  }
-  for (std::size_t i = 0; i < lights.size(); ++i)
+  for (std::size_t i = 0; i < lights.size(); ++i) {
+    m_places.push_back(lights[i]->place());
     if (lights[i]->isDelta() || !carried) {
       m_lamps.push_back(i);
       lamps.push_back(lights[i].get());
     }
+  }
   if (lamps.size() > LampChoice::kFew) m_choice = std::make_shared<LampChoice>(medium, lamps);
 }
 
@@ -80,17 +77,18 @@ Rgb DirectLight::of(std::size_t i, const Vec3f& p, const Vec3f& wo, const Coeffi
                     When when) const {
   const lights::Light& light = *m_lights[i];
   const Vec2f u = light.isDelta() ? Vec2f(0.5f) : rng.uniform2();
-  const std::optional<Place>& place = m_places[i];
+  const std::optional<lights::Place>& place = m_places[i];
   std::optional<Drawn> drawn;
-  if (step && place) drawn = drawNear(*step, p, place->center, place->extent, rng);
+  if (step && place) drawn = drawNear(*step, p, *place, rng);
   const Vec3f at = drawn ? drawn->p : p;
   lights::Illumination in = light.illuminate(at, u);
   if (!(maxComponent(in.irradiance) > 0.0f)) return Rgb(0.0f);
   if (drawn) {
-    const Vec3f away = at - place->center;
-    const float square = light.isDelta() ? in.distance * in.distance
-                                         : glm::dot(away, away) + place->extent * place->extent;
-    in.irradiance *= drawn->weight * square;
+    // Of a point the distance that its light was divided by, so that rounding cancels as well.
+    const auto extent = static_cast<float>(place->extent);
+    const Vec3f away = at - Vec3f(place->center);
+    in.irradiance *= drawn->weight * (light.isDelta() ? in.distance * in.distance
+                                                      : glm::dot(away, away) + extent * extent);
   }
   const Light visible = m_useShadows
                             ? m_shadows.transmittance<Light>(i, at, in.direction, in.distance, rng,

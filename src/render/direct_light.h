@@ -40,11 +40,6 @@ class DirectLight {
          Rng& rng, IntegratorCounters& counters, When when) const;
 
  private:
-  struct Place {  // lights::Place
-    Vec3f center;
-    float extent;
-  };
-
   template <class Light, class When>
   Rgb of(std::size_t light, const Vec3f& p, const Vec3f& wo, const transport::Coefficients& c,
          const MarchStep* step, Rng& rng, IntegratorCounters& counters, When when) const;
@@ -53,7 +48,7 @@ class DirectLight {
   const transport::LightList& m_lights;
   const Shadows& m_shadows;
   bool m_useShadows;
-  std::vector<std::optional<Place>> m_places;  // by light; nothing = far away
+  std::vector<std::optional<lights::Place>> m_places;  // by light
   std::vector<std::size_t> m_lamps;
   std::shared_ptr<const LampChoice> m_choice;  // of many lamps
 };

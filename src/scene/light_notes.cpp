@@ -18,8 +18,9 @@ constexpr double kWidths = 6, kWidthsBackward = 2;
 // A ball of three spacings, the automatic radius, holds about as many particles.
 constexpr std::size_t kFewCarriers = 20;
 
-// |g| from where on what an eye in smoke sees next to it is too dim toward a light: by 0.07 at 0.5,
-// 0.12 at 0.8, 0.2 at 0.9 (0.03 at 0.3).
+// |g| from where on what an eye in smoke sees next to it is too dim toward a light: a frame by 0.07
+// at 0.5, 0.12 at 0.8, 0.2 at 0.9 (0.03 at 0.3), what in it was scattered more than once by 0.2 and
+// 0.25 at the last two. In 128 bins read per step that is within 0.04.
 constexpr double kForwardLobe = 0.5;
 constexpr double kSeenDepth = 0.01;  // of a light voxel that has a part in the picture
 
@@ -75,11 +76,9 @@ void noteEyeInSmoke(FrameSetup& setup) {
   if (!(depth > kSeenDepth)) return;
   setup.notes.push_back(fmt::format(
       "the eye is in smoke that scatters into a lobe of |g| = {:.3g}: along it, what is next to "
-      "the "
-      "eye and was scattered more than once is up to a fifth too dim; estimator.basis = "
+      "the eye and was scattered more than once is up to a quarter too dim; estimator.basis = "
       "\"histogram\" with evaluate = \"per_step\" and rows = 4 keeps its directions apart, in "
-      "several "
-      "times the time",
+      "several times the time",
       lobe));
 }
 
