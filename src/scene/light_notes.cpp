@@ -20,7 +20,8 @@ constexpr std::size_t kFewCarriers = 20;
 
 // |g| from where on what an eye in smoke sees next to it is too dim toward a light: a frame by 0.07
 // at 0.5, 0.12 at 0.8, 0.2 at 0.9 (0.03 at 0.3), what in it was scattered more than once by 0.2 and
-// 0.25 at the last two. In 128 bins read per step that is within 0.04.
+// 0.25 at the last two, next to a lamp by a third at 0.85, and what its surface sends by a quarter.
+// In 128 bins read per step light scattered more than once is within 0.04.
 constexpr double kForwardLobe = 0.5;
 constexpr double kSeenDepth = 0.01;  // of a light voxel that has a part in the picture
 
@@ -75,10 +76,10 @@ void noteEyeInSmoke(FrameSetup& setup) {
                  Vec3f(setup.view.eye + edge * Vec3d(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1))));
   if (!(depth > kSeenDepth)) return;
   setup.notes.push_back(fmt::format(
-      "the eye is in smoke that scatters into a lobe of |g| = {:.3g}: along it, what is next to "
-      "the eye and was scattered more than once is up to a quarter too dim; estimator.basis = "
-      "\"histogram\" with evaluate = \"per_step\" and rows = 4 keeps its directions apart, in "
-      "several times the time",
+      "the eye is in smoke that scatters into a lobe of |g| = {:.3g}: along it, stored light (of "
+      "lamps with a surface, and scattered more than once) is up to a third too dim next to the "
+      "eye; estimator.basis = \"histogram\" with evaluate = \"per_step\" and rows = 4 keeps its "
+      "directions apart, in ten times the time or more",
       lobe));
 }
 
