@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "deposit.h"
+#include "near_eye.h"
 #include "photosphere/core/error.h"
 #include "photosphere/core/fixed_point.h"
 #include "photosphere/core/parallel.h"
@@ -56,8 +57,10 @@ class Tracing {
   Tracing(LightSums& light, Checkpoint* checkpoint, std::uint64_t part)
       : m_light(light), m_checkpoint(checkpoint), m_part(part) {
     m_sums.quantum = light.quantum;
-    m_sums.sums.assign(light.places() * static_cast<std::size_t>(light.layout.valuesPerCarrier()),
-                       0);
+    m_sums.sums.assign(sizeOf(light), 0);
+    if (!light.near) return;
+    m_near.quantum = light.near->quantum;
+    m_near.sums.assign(sizeOf(*light.near), 0);
   }
 
   TraceStatistics run(const Medium& medium, const transport::LightList& lights, const View& view,
@@ -68,7 +71,15 @@ class Tracing {
       if (m_light.weights) weight.emplace(medium, m_light.lattice, m_light.layout, view);
       VoxelSink sink(carriers, m_light.layout.deposit, m_light.lattice, weight ? &*weight : nullptr,
                      m_light.weights.get());
-      return trace(medium, lights, options, sink);
+      if (!m_light.near) return trace(medium, lights, options, sink);
+      const LightSums& near = *m_light.near;
+      std::optional<VisibleWeight> nearWeight;
+      if (near.weights) nearWeight.emplace(medium, near.lattice, m_light.layout, view);
+      VoxelSink nearSink(CarrierSums(medium, lights, near.layout, view, options.key, m_near),
+                         near.layout.deposit, near.lattice, nearWeight ? &*nearWeight : nullptr,
+                         near.weights.get());
+      NearEyeSink both(sink, nearSink, near.lattice, view.eye);
+      return trace(medium, lights, options, both);
     }
     const ParticleIndex index(m_light.particles, m_light.layout.depositRadius);
     ParticleSink sink(carriers, m_light.layout, m_light.particles, index);
@@ -83,9 +94,11 @@ class Tracing {
                                           [this](StateReader& r) { resume(r); }};
     const TraceStatistics statistics =
         transport::tracePhotons(medium, lights, options, sink, keeping);
-    if (m_sums.overflows > 0) failOverflow(m_sums.overflows);
+    if (const std::uint64_t lost = m_sums.overflows + m_near.overflows; lost > 0)
+      failOverflow(lost);
     m_light.farPhotons = farPhotons();
     m_light.sums = std::move(m_sums.sums);
+    if (m_light.near) m_light.near->sums = std::move(m_near.sums);
     return statistics;
   }
 
@@ -95,15 +108,22 @@ class Tracing {
 
   void keep(StateWriter& w) const {
     w.value(farPhotons());
-    w.value(m_sums.overflows.load());
-    w.value(m_sums.sums);
+    for (const FixedSums* sums : {&m_sums, &m_near}) {
+      w.value(sums->overflows.load());
+      w.value(sums->sums);
+    }
   }
   void resume(StateReader& r) {
     r.value(m_farBefore);
-    m_sums.overflows = r.value<std::uint64_t>();
-    const std::size_t size = m_sums.sums.size();
-    r.value(m_sums.sums);
-    if (m_sums.sums.size() != size) r.fail();
+    for (FixedSums* sums : {&m_sums, &m_near}) {
+      sums->overflows = r.value<std::uint64_t>();
+      const std::size_t size = sums->sums.size();
+      r.value(sums->sums);
+      if (sums->sums.size() != size) r.fail();
+    }
+  }
+  static std::size_t sizeOf(const LightSums& light) {
+    return light.places() * static_cast<std::size_t>(light.layout.valuesPerCarrier());
   }
 
   LightSums& m_light;
@@ -111,8 +131,28 @@ class Tracing {
   std::uint64_t m_part;
   std::uint64_t m_farBefore = 0;              // of earlier runs
   const ParticleSink* m_particles = nullptr;  // while photons are traced onto particles
-  FixedSums m_sums;
+  FixedSums m_sums, m_near;
 };
+
+// What is kept of directions around an eye in smoke, empty; null where that is not asked for.
+std::shared_ptr<LightSums> sumsNearEye(const Medium& medium, const LightSums& light,
+                                       const View& view) {
+  if (light.layout.basis != Basis::view || !readsNearEye(medium, light.layout, view)) return {};
+  const std::vector<std::size_t> voxels = voxelsNearEye(light.lattice, light.layout, view);
+  if (voxels.empty()) return {};
+  auto near = std::make_shared<LightSums>();
+  near->layout = nearLayout(light.layout);
+  near->lattice = partOf(light.lattice, voxels);
+  if (light.weights) {
+    auto weights = std::make_shared<std::vector<float>>();
+    for (const std::size_t i : voxels)
+      weights->push_back((*light.weights)[i]);
+    near->weights = std::move(weights);
+  }
+  near->quantum = light.quantum;
+  near->photons = light.photons;
+  return near;
+}
 
 }  // namespace
 
@@ -142,6 +182,7 @@ LightSums traceLightSums(const Medium& medium, const transport::LightList& light
     if (!light.weights || light.weights->size() != light.lattice.size())
       light.weights = visibleWeights(medium, light.lattice, layout, view);
   }
+  light.near = sumsNearEye(medium, light, view);
   statistics = Tracing(light, checkpoint, part).run(medium, lights, view, options);
   return light;
 }
@@ -153,6 +194,7 @@ void addSums(LightSums& into, const LightSums& other) {
       if (!addChecked(into.sums[i], other.sums[i])) ++overflows;
   });
   if (overflows > 0) failOverflow(overflows);
+  if (into.near) addSums(*into.near, *other.near);
   into.photonCount += other.photonCount;
   into.firstPhoton = std::min(into.firstPhoton, other.firstPhoton);
   into.farPhotons += other.farPhotons;
@@ -166,6 +208,7 @@ LightField toField(LightSums light) {
   field.weights = std::move(light.weights);
   field.photons = light.photons;
   field.farPhotons = light.farPhotons;
+  if (light.near) field.near = std::make_shared<LightField>(toField(std::move(*light.near)));
   const double edge = field.lattice.edge();
   const double volume = field.layout.holdsPower() ? 1.0 : edge * edge * edge;
   const double worth =

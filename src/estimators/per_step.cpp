@@ -1,6 +1,7 @@
 #include "per_step.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <bit>
 #include <cmath>
@@ -63,20 +64,42 @@ class PerStep : public InscatterSource {
 
  protected:
   using Towards = std::vector<PhaseReader::Toward>;
-  // One for each phase function. The direction toward the eye changes from ray to ray, not from
-  // step to step: each thread remembers its last.
-  const Towards& toward(const Vec3f& wo) const {
-    struct Memory {
-      std::uint64_t owner = 0;
-      Towards towards;
+  // By set and phase function.
+  using Read = std::array<std::array<Rgb, transport::kMaxPhases>, 2>;
+  // The direction toward the eye changes from ray to ray, not from step to step, and steps ask for
+  // the same carriers again: each thread remembers its last.
+  struct Memory {
+    std::uint64_t owner = 0;
+    Towards towards;  // by phase function
+    struct Place {
+      std::uint64_t ray = 0;
+      std::size_t carrier = 0;
+      Read read;
     };
+    std::uint64_t ray = 0;
+    std::array<Place, 128> places;
+  };
+  Memory& memoryOf(const Vec3f& wo) const {
     static thread_local Memory memory;
-    if (memory.owner == m_id && memory.towards.front().wo == wo) return memory.towards;
+    if (memory.owner == m_id && memory.towards.front().wo == wo) return memory;
     memory.owner = m_id;
+    ++memory.ray;
     memory.towards.resize(m_readers.size());
     for (std::size_t k = 0; k < m_readers.size(); ++k)
       m_readers[k].turn(wo, memory.towards[k]);
-    return memory.towards;
+    return memory;
+  }
+  const Towards& toward(const Vec3f& wo) const { return memoryOf(wo).towards; }
+  // What a carrier shows in the direction of the memory.
+  const Read& readOf(std::size_t carrier, Memory& memory) const {
+    Memory::Place& place = memory.places[carrier % memory.places.size()];
+    if (place.ray == memory.ray && place.carrier == carrier) return place.read;
+    place.ray = memory.ray;
+    place.carrier = carrier;
+    for (std::size_t s = 0; s < m_sets; ++s)
+      for (std::size_t k = 0; k < m_readers.size(); ++k)
+        place.read[s][k] = m_readers[k].read(set(carrier, s), memory.towards[k]);
+    return place.read;
   }
   const float* set(std::size_t carrier, std::size_t set) const {
     return m_field.values.data() + carrier * m_stride + set * m_setSize;
@@ -120,53 +143,91 @@ class VoxelSteps final : public PerStep {
     const transport::SupportLattice& lattice = m_field.lattice;
     m_inverseEdge = static_cast<float>(1.0 / lattice.edge());
     m_firstNode = Vec3f(lattice.origin() + 0.5 * lattice.edge());
-    // Four values at a time, as a colour.
-    std::vector<float> again(m_field.values.size());
-    for (std::size_t first = 0; first < m_stride; first += 4) {
-      const std::size_t count = std::min<std::size_t>(4, m_stride - first);
-      Colours colours(lattice.size(), Vec4f(0.0f));
-      for (std::size_t i = 0; i < colours.size(); ++i)
-        for (std::size_t k = 0; k < count; ++k)
-          colours[i][static_cast<int>(k)] = m_field.values[i * m_stride + first + k];
-      const Smoothed smoothed =
-          smoothVoxels(lattice, colours, m_field.layout.kernel, m_field.layout.radius);
-      for (std::size_t i = 0; i < colours.size(); ++i)
-        for (std::size_t k = 0; k < count; ++k) {
-          m_field.values[i * m_stride + first + k] = smoothed.once[i][static_cast<int>(k)];
-          again[i * m_stride + first + k] = smoothed.again[i][static_cast<int>(k)];
-        }
-    }
-    sharpen(m_field.layout, again, m_field.values);
+    if (m_field.layout.smoothing == Smoothing::visible && m_field.weights)
+      smoothWeightedValues();
+    else
+      smoothValues();
     measureNegative();
   }
 
-  // Trilinear over the eight nearest voxel centres, inactive ones dark.
+  // Trilinear over the eight nearest voxel centres, inactive ones dark; where values are weighted,
+  // over their weights.
   Inscatter at(const Vec3f& p, const Vec3f& wo, const Coefficients& c) const override {
     const Vec3f u = (p - m_firstNode) * m_inverseEdge;
     const Vec3f base = glm::floor(u), f = u - base;
     const Vec3i low(base);
-    const Towards& towards = toward(wo);
-    Rgb light[2][transport::kMaxPhases] = {};
+    Memory& memory = memoryOf(wo);
+    Read light{};
+    float weight = 0.0f;
     for (int corner = 0; corner < 8; ++corner) {
       const Vec3i step(corner & 1, corner >> 1 & 1, corner >> 2);
       const std::int32_t voxel = m_field.lattice.number(low + step);
       if (voxel < 0) continue;
       const float w =
           (step.x ? f.x : 1 - f.x) * (step.y ? f.y : 1 - f.y) * (step.z ? f.z : 1 - f.z);
+      if (!m_weights.empty()) weight += w * m_weights[static_cast<std::size_t>(voxel)];
+      const Read& read = readOf(static_cast<std::size_t>(voxel), memory);
       for (std::size_t s = 0; s < m_sets; ++s)
         for (std::size_t k = 0; k < m_readers.size(); ++k)
-          light[s][k] += w * m_readers[k].read(set(static_cast<std::size_t>(voxel), s), towards[k]);
+          light[s][k] += w * read[s][k];
     }
     Inscatter result;
+    if (!m_weights.empty() && !(weight > 0.0f)) return result;
+    const float scale = m_weights.empty() ? 1.0f : 1.0f / weight;
     for (std::size_t s = 0; s < m_sets; ++s)
       for (std::size_t k = 0; k < m_readers.size(); ++k)
-        add(light[s][k], s, c.scattering[k], result);
+        add(light[s][k], s, c.scattering[k] * scale, result);
     return result;
   }
 
  private:
+  // As many values at a time as a colour has, `count` at most.
+  template <class Smooth>
+  void forEachColour(std::size_t count, const Smooth& smooth) {
+    Colours colours(m_field.lattice.size(), Vec4f(0.0f));
+    for (std::size_t first = 0; first < m_stride; first += count) {
+      const std::size_t n = std::min(count, m_stride - first);
+      for (std::size_t i = 0; i < colours.size(); ++i)
+        for (std::size_t k = 0; k < n; ++k)
+          colours[i][static_cast<int>(k)] = m_field.values[i * m_stride + first + k];
+      smooth(colours, first, n);
+    }
+  }
+  void store(const Colours& colours, std::size_t first, std::size_t n, std::vector<float>& values) {
+    for (std::size_t i = 0; i < colours.size(); ++i)
+      for (std::size_t k = 0; k < n; ++k)
+        values[i * m_stride + first + k] = colours[i][static_cast<int>(k)];
+  }
+
+  void smoothValues() {
+    const LightFieldLayout& layout = m_field.layout;
+    std::vector<float> again(m_field.values.size());
+    forEachColour(4, [&](const Colours& colours, std::size_t first, std::size_t n) {
+      const Smoothed smoothed =
+          smoothVoxels(m_field.lattice, colours, layout.kernel, layout.radius);
+      store(smoothed.once, first, n, m_field.values);
+      store(smoothed.again, first, n, again);
+    });
+    sharpen(layout, again, m_field.values);
+  }
+
+  // As once for each view (Smoothing::visible): values times their weights, and the weights.
+  void smoothWeightedValues() {
+    const std::vector<float>& weights = *m_field.weights;
+    m_weights.resize(weights.size());
+    forEachColour(3, [&](Colours& colours, std::size_t first, std::size_t n) {
+      for (std::size_t i = 0; i < colours.size(); ++i)
+        colours[i] = Vec4f(Vec3f(colours[i]) * weights[i], 0.0f);
+      const Colours smoothed = smoothWeighted(m_field.lattice, colours, weights, m_field.layout);
+      store(smoothed, first, n, m_field.values);
+      for (std::size_t i = 0; i < smoothed.size(); ++i)
+        m_weights[i] = smoothed[i].w;
+    });
+  }
+
   Vec3f m_firstNode{0.0f};
   float m_inverseEdge = 1.0f;
+  std::vector<float> m_weights;  // what values are times of; none = 1
 };
 
 class ParticleSteps final : public PerStep {

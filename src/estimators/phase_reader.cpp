@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
+
+#include "photosphere/core/simd.h"
 
 namespace photosphere::estimators {
 
@@ -23,6 +26,38 @@ double leastShare(const phase::PhaseFunction& function) {
     least = std::min(least, static_cast<double>(function.evaluate(w, Vec3f(0, 0, 1))));
   }
   return 4 * kPi * least;
+}
+
+Float4 loaded(const float* from) {
+  Float4 four;
+  std::memcpy(&four, from, sizeof(four));
+  return four;
+}
+
+// Sums of values times their weights; four at a time, as the compiler may not change their order.
+float weighted(const float* weights, const float* values, int count) {
+  Float4 four{};
+  int j = 0;
+  for (; j + 4 <= count; j += 4)
+    four += loaded(weights + j) * loaded(values + j);
+  float sum = (four[0] + four[1]) + (four[2] + four[3]);
+  for (; j < count; ++j)
+    sum += weights[j] * values[j];
+  return sum;
+}
+// The same of colours, [value][3].
+Rgb weightedColours(const float* weights, const float* values, int count) {
+  Float4 even{}, odd{};  // the fourth belongs to the next colour
+  int j = 0;
+  for (; j + 2 < count; j += 2) {
+    even += weights[j] * loaded(values + 3 * j);
+    odd += weights[j + 1] * loaded(values + 3 * j + 3);
+  }
+  even += odd;
+  Rgb sum(even[0], even[1], even[2]);
+  for (; j < count; ++j)
+    sum += weights[j] * Rgb(values[3 * j], values[3 * j + 1], values[3 * j + 2]);
+  return sum;
 }
 
 }  // namespace
@@ -132,18 +167,17 @@ void PhaseReader::turn(const Vec3f& wo, Toward& toward) const {
 Rgb PhaseReader::read(const float* set, const Toward& toward) const {
   const int channelCount = m_layout.channels;
   if (m_layout.basis == Basis::view) return channels(set + m_phase * channelCount);
-  Rgb sum(0.0f);
   const int bins = m_layout.bins();
-  if (m_lobes) {
-    for (int j = 0; j < bins; ++j) {
-      const float f = lobe(set, j, toward.wo);
-      for (int c = 0; c < channelCount; ++c)
-        sum[c] += f * set[j * channelCount + c];
-    }
-  } else {
-    for (int j = 0; j < bins; ++j)
-      for (int c = 0; c < channelCount; ++c)
-        sum[c] += toward.weights[static_cast<std::size_t>(j)] * set[j * channelCount + c];
+  if (!m_lobes) {
+    const float* weights = toward.weights.data();
+    return channelCount == 1 ? Rgb(weighted(weights, set, bins))
+                             : weightedColours(weights, set, bins);
+  }
+  Rgb sum(0.0f);
+  for (int j = 0; j < bins; ++j) {
+    const float f = lobe(set, j, toward.wo);
+    for (int c = 0; c < channelCount; ++c)
+      sum[c] += f * set[j * channelCount + c];
   }
   return channels(&sum.x);
 }

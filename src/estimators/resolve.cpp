@@ -3,6 +3,7 @@
 #include <memory>
 #include <optional>
 
+#include "near_eye.h"
 #include "particle_gather.h"
 #include "per_step.h"
 #include "phase_reader.h"
@@ -193,7 +194,12 @@ std::unique_ptr<InscatterSource> resolve(const Medium& medium, LightField field,
                                          RandomKey key) {
   if (field.layout.evaluate == Evaluate::perStep)
     return evaluatePerStep(medium, std::move(field), key);
-  return std::make_unique<ResolvedField>(medium, field, view, key);
+  std::optional<LightField> near = nearField(medium, field, view);
+  auto resolved = std::make_unique<ResolvedField>(medium, field, view, key);
+  if (!near) return resolved;
+  const double radius = field.layout.nearEye * field.layout.lightVoxel * medium.voxelEdge();
+  return joinAtEye(std::move(resolved), evaluatePerStep(medium, std::move(*near), key),
+                   Vec3f(view.eye), radius);
 }
 
 }  // namespace photosphere::estimators

@@ -52,12 +52,12 @@ SceneFile sceneOfFrame(const SceneFile& written, std::int64_t frame, const Setup
 }
 
 // Of light that this frame stores itself; what a cache holds is known when it is read.
-void noteCoarseLight(const SceneFile& scene, bool forLightCache, FrameSetup& setup) {
+void noteCoarseLight(const SceneFile& scene, FrameSetup& setup) {
   if (scene.estimator.text("type") != "photosphere" || !scene.estimator.text("cache").empty() ||
       !setup.effects.multipleScattering || setup.medium->bounds().empty())
     return;
   noteCoarseDirections(setup);
-  if (!forLightCache) noteEyeInSmoke(setup);
+  noteEyeInSmoke(setup);
   noteFewCarriers(setup);
 }
 
@@ -111,7 +111,7 @@ FrameSetup setUpAbout(const std::optional<Vec3d>& center, const SceneFile& scene
   planEffects(scene, options.forLightCache || !scene.estimator.text("cache").empty(), setup);
   viewFromTheMiddle(setup);
   chooseLayout(scene, options.forLightCache, setup);
-  noteCoarseLight(scene, options.forLightCache, setup);
+  noteCoarseLight(scene, setup);
   const std::int64_t seed = options.seed.value_or(scene.scene.integer("seed"));
   setup.key = RandomKey::fromSeed(static_cast<std::uint64_t>(seed),
                                   scene.scene.flag("seed_per_frame") ? frame : 0);
@@ -161,9 +161,9 @@ std::uint64_t predictedLightBytes(const FrameSetup& setup) {
   const std::uint64_t bytesEach = sizeof(std::int64_t) + sizeof(float) * (perStep ? 2 : 1);
   const transport::Medium& medium = *setup.medium;
   if (medium.bounds().empty()) return 0;
-  std::uint64_t bytes = 0;
+  std::uint64_t bytes = estimators::nearEyeBytes(medium, l, setup.view);
   if (l.carrier == estimators::Carrier::particles)
-    bytes = setup.particles.size() * values * bytesEach;
+    bytes += setup.particles.size() * values * bytesEach;
   if (l.holdsPower()) return bytes;
   const double edge = l.lightVoxel * medium.voxelEdge();
   const int margin = static_cast<int>(std::ceil(l.radius / edge)) + 1;

@@ -104,6 +104,12 @@ void heedParallax(const SceneFile& scene, bool forLightCache, FrameSetup& setup)
             "\"per_step\" serves all"));
 }
 
+// Light voxels from the eye up to which directions are looked up toward the eye of each ray where
+// smoke scatters unevenly. Light scattered more than once around an eye in smoke of g = 0.8, over
+// that with all of it looked up so: 0.61 at 0, 0.98 at 1, 1.00 at 2 in a column; 0.70, 0.96, 0.99
+// and 1.00 at 4 in a wide plume.
+constexpr double kNearVoxels = 3;
+
 constexpr double kHalfDiagonal = 0.8661;  // of a cube of edge 1, and a little
 
 // The radius that the scene states, or one that suits the smoke, within what light voxels can hold.
@@ -180,6 +186,8 @@ void chooseLayout(const SceneFile& scene, bool forLightCache, FrameSetup& setup)
   l.phases = static_cast<int>(setup.medium->phases().size());
   for (const auto& light : setup.lights)
     l.unscattered = l.unscattered || (!light->isDelta() && setup.effects.singleScattering);
+  if (!forLightCache && !even && setup.view.hasEye && l.evaluate == Evaluate::perView)
+    l.nearEye = kNearVoxels;
   chooseSmoothing(e, setup);
   chooseLightVoxel(e, setup);
   chooseRadius(e, setup);

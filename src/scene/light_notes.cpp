@@ -18,13 +18,6 @@ constexpr double kWidths = 6, kWidthsBackward = 2;
 // A ball of three spacings, the automatic radius, holds about as many particles.
 constexpr std::size_t kFewCarriers = 20;
 
-// |g| from where on what an eye in smoke sees next to it is too dim toward a light: a frame by 0.07
-// at 0.5, 0.12 at 0.8, 0.2 at 0.9 (0.03 at 0.3), what in it was scattered more than once by 0.2 and
-// 0.25 at the last two, next to a lamp by a third at 0.85, and what its surface sends by a quarter.
-// In 128 bins read per step light scattered more than once is within 0.04.
-constexpr double kForwardLobe = 0.5;
-constexpr double kSeenDepth = 0.01;  // of a light voxel that has a part in the picture
-
 }  // namespace
 
 double sharpestLobe(const transport::Medium& medium) {
@@ -64,23 +57,11 @@ void noteCoarseDirections(FrameSetup& setup) {
 }
 
 void noteEyeInSmoke(FrameSetup& setup) {
-  const double lobe = sharpestLobe(*setup.medium);
-  if (!setup.view.hasEye || setup.layout.evaluate != estimators::Evaluate::perView ||
-      lobe < kForwardLobe)
-    return;
-  const double edge = setup.layout.lightVoxel * setup.medium->voxelEdge();
-  double depth = 0;  // of the way through a light voxel, in the mean of the 27 around the eye
-  for (int i = 0; i < 27; ++i)
-    depth += edge / 27 *
-             static_cast<double>(setup.medium->extinction(
-                 Vec3f(setup.view.eye + edge * Vec3d(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1))));
-  if (!(depth > kSeenDepth)) return;
+  if (estimators::nearEyeBytes(*setup.medium, setup.layout, setup.view) == 0) return;
   setup.notes.push_back(fmt::format(
-      "the eye is in smoke that scatters into a lobe of |g| = {:.3g}: along it, stored light (of "
-      "lamps with a surface, and scattered more than once) is up to a third too dim next to the "
-      "eye; estimator.basis = \"histogram\" with evaluate = \"per_step\" and rows = 4 keeps its "
-      "directions apart, in ten times the time or more",
-      lobe));
+      "the eye is in smoke that scatters more to one side than to another: within {:.3g} light "
+      "voxels of it directions are kept, and looked up toward the eye of each ray",
+      setup.layout.nearEye));
 }
 
 void noteFewCarriers(FrameSetup& setup) {

@@ -12,9 +12,8 @@ double sharpestLobe(const transport::Medium& medium);
 /// into it shows all over a bin.
 void noteCoarseDirections(FrameSetup& setup);
 
-/// Adds a note where the eye is in smoke that scatters into a lobe, and light is resolved for it:
-/// across the light voxels next to it the direction that it sees them in changes more than the lobe
-/// is wide.
+/// Adds a note where the eye is in smoke that does not scatter evenly, and directions are kept
+/// there that are not kept elsewhere.
 void noteEyeInSmoke(FrameSetup& setup);
 
 /// Adds a note where fewer particles carry light than one look-up takes.

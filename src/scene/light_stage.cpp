@@ -61,6 +61,7 @@ estimators::LightField readField(const SceneFile& scene, bool allowStale, FrameS
     layout.smoothing = setup.layout.smoothing;
   layout.merge = setup.layout.merge;
   layout.evaluate = setup.layout.evaluate;
+  layout.nearEye = setup.layout.nearEye;
   layout.directions = setup.layout.directions;
   if (layout.direction != sphere::DirectionDeposit::kernel) {
     layout.angularKernel = setup.layout.angularKernel;

@@ -239,7 +239,8 @@ std::span<const Param> estimatorParams() {
        .type = ParamType::text,
        .unit = "",
        .defaultText = "per_view",
-       .help = "when directions are resolved: once for each carrier, or at every march step",
+       .help = "when directions are resolved: once for each carrier (at every march step next to "
+               "an eye in smoke), or at every march step",
        .choices = "per_view|per_step"},
       {.name = "kernel",
        .type = ParamType::text,

@@ -45,7 +45,7 @@ enum class Merge {
 };
 /// When the direction toward the eye is taken.
 enum class Evaluate {
-  perView,  ///< once for each carrier
+  perView,  ///< once for each carrier, but at every step next to an eye in smoke (nearEye)
   perStep,  ///< at every march step, as in the paper
 };
 
@@ -71,6 +71,9 @@ struct LightFieldLayout {
   Representative representative = Representative::bin;
   Merge merge = Merge::full;  ///< particles
   Evaluate evaluate = Evaluate::perView;
+  /// Distance from the eye up to which perView, too, reads directions at every march step [light
+  /// voxels]: a carrier next to the eye is seen from many. 0 = nowhere.
+  double nearEye = 0.0;
   /// Smooths directions when they are read, or spreads them when they are deposited
   /// (DirectionDeposit::kernel): once, not twice.
   sphere::AngularKernel angularKernel = sphere::AngularKernel::none;
@@ -111,6 +114,9 @@ struct LightField {
   /// What the values of voxels count by for Smoothing::visible, visibleWeights; nothing = `resolve`
   /// makes them.
   std::shared_ptr<const std::vector<float>> weights;
+  /// Directions of the same light around an eye in smoke, for Basis::view, which keeps none; null
+  /// where nobody asks (LightFieldLayout::nearEye).
+  std::shared_ptr<LightField> near;
   std::uint64_t photons = 0;     ///< emitted in all
   std::uint64_t farPhotons = 0;  ///< collisions without a particle in range, given to the nearest
 
@@ -118,7 +124,8 @@ struct LightField {
     return layout.carrier == Carrier::voxels ? lattice.size() : particles.size();
   }
   std::uint64_t memoryBytes() const {
-    return lattice.memoryBytes() + particles.size() * sizeof(Vec3f) + values.size() * sizeof(float);
+    return lattice.memoryBytes() + particles.size() * sizeof(Vec3f) +
+           values.size() * sizeof(float) + (near ? near->memoryBytes() : 0);
   }
 };
 
@@ -143,6 +150,11 @@ LightField traceLightField(const transport::Medium& medium, const transport::Lig
 double automaticRadius(const transport::Medium& medium, const LightFieldLayout& layout,
                        std::uint64_t photons);
 
+/// Memory that directions around an eye in smoke take at most while they are gathered and read, for
+/// Basis::view [B].
+std::uint64_t nearEyeBytes(const transport::Medium& medium, const LightFieldLayout& layout,
+                           const View& view);
+
 /// Mean over each voxel of the lattice of extinction times transmittance toward the eye, or in the
 /// mean of all directions (any basis but Basis::view), times the voxel's edge [1]: what photons
 /// count by for Smoothing::visible. They depend on the smoke and the view alone, so that fields of
@@ -154,7 +166,8 @@ std::shared_ptr<const std::vector<float>> visibleWeights(const transport::Medium
 
 /// Resolves the field for one view: histogram and phase fold into one colour per carrier and phase
 /// function, which is then smoothed and laid out for lookups (METHOD.md sections 5.1 to 5.3).
-/// Evaluate::perStep keeps the field instead and asks it at every march step.
+/// Evaluate::perStep keeps the field instead and asks it at every march step, as is done next to an
+/// eye in smoke (LightFieldLayout::nearEye).
 /// @param medium  must outlive the source
 /// @param field   std::move it where it is not needed again
 /// @param key     of the random numbers that Merge::sampled draws

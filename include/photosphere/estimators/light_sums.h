@@ -3,6 +3,7 @@
 // that is interrupted goes on from (METHOD.md section 6).
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "photosphere/core/checkpoint.h"
@@ -22,6 +23,7 @@ struct LightSums {
   /// left where they are 0.
   std::shared_ptr<const std::vector<float>> weights;
   std::vector<std::int64_t> sums;                  ///< [voxel or particle][set][bin][channel]
+  std::shared_ptr<LightSums> near;                 ///< of LightField::near
   double quantum = 1.0;                            ///< worth of one unit [W m], or [W] (holdsPower)
   std::uint64_t photons = 0;                       ///< of the whole frame
   std::uint64_t firstPhoton = 0, photonCount = 0;  ///< of these, those that are summed here
