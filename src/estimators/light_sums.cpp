@@ -137,7 +137,7 @@ class Tracing {
 // What is kept of directions around an eye in smoke, empty; null where that is not asked for.
 std::shared_ptr<LightSums> sumsNearEye(const Medium& medium, const LightSums& light,
                                        const View& view) {
-  if (light.layout.basis != Basis::view || !readsNearEye(medium, light.layout, view)) return {};
+  if (!gathersNearEye(medium, light.layout, view)) return {};
   const std::vector<std::size_t> voxels = voxelsNearEye(light.lattice, light.layout, view);
   if (voxels.empty()) return {};
   auto near = std::make_shared<LightSums>();
@@ -194,7 +194,7 @@ void addSums(LightSums& into, const LightSums& other) {
       if (!addChecked(into.sums[i], other.sums[i])) ++overflows;
   });
   if (overflows > 0) failOverflow(overflows);
-  if (into.near) addSums(*into.near, *other.near);
+  if (into.near && other.near) addSums(*into.near, *other.near);
   into.photonCount += other.photonCount;
   into.firstPhoton = std::min(into.firstPhoton, other.firstPhoton);
   into.farPhotons += other.farPhotons;

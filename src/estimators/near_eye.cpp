@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace photosphere::estimators {
 
@@ -33,7 +34,7 @@ LightField partNearEye(const LightField& field, const View& view, double edge) {
   std::vector<std::size_t> carriers;
   if (field.layout.carrier == Carrier::voxels) {
     carriers = voxelsNearEye(field.lattice, field.layout, view);
-    part.lattice = partOf(field.lattice, carriers);
+    if (!carriers.empty()) part.lattice = partOf(field.lattice, carriers);
   } else {
     const double reach = reachOf(field.layout, edge);
     for (std::size_t i = 0; i < field.particles.size(); ++i)
@@ -81,6 +82,12 @@ class JoinedAtEye final : public InscatterSource {
 
 bool readsNearEye(const Medium& medium, const LightFieldLayout& layout, const View& view) {
   if (!(layout.nearEye > 0) || !view.hasEye || layout.evaluate != Evaluate::perView) return false;
+  if (medium.isMoving()) {
+    // It may come by while the shutter is open.
+    const double apart = layout.nearEye * edgeOf(medium, layout);
+    const Box3d& box = medium.bounds();
+    return !box.empty() && glm::length(view.eye - box.nearest(view.eye)) < apart;
+  }
   // Half a light voxel apart.
   const double step = 0.5 * edgeOf(medium, layout);
   const int n = static_cast<int>(std::ceil(2 * layout.nearEye));
@@ -92,14 +99,19 @@ bool readsNearEye(const Medium& medium, const LightFieldLayout& layout, const Vi
 }
 
 std::uint64_t nearEyeBytes(const Medium& medium, const LightFieldLayout& layout, const View& view) {
-  if (layout.basis != Basis::view || !readsNearEye(medium, layout, view)) return 0;
+  if (!gathersNearEye(medium, layout, view)) return 0;
   const double edge = edgeOf(medium, layout);
   const double across = reachOf(layout, edge) / edge + 1.0;
+  const Vec3d box = medium.bounds().extent() / edge + 2.0 * layout.radius / edge + 10.0;
+  const double voxels = std::min(4.0 / 3.0 * kPi * across * across * across, box.x * box.y * box.z);
   const LightFieldLayout near = nearLayout(layout);
   // Sums, and the values that they make; later two smoothings of these.
   const double each = sizeof(std::int64_t) + sizeof(float);
-  return static_cast<std::uint64_t>(4.0 / 3.0 * kPi * across * across * across * each *
-                                    near.valuesPerCarrier());
+  return static_cast<std::uint64_t>(std::min(voxels * each * near.valuesPerCarrier(), 1e18));
+}
+
+bool gathersNearEye(const Medium& medium, const LightFieldLayout& layout, const View& view) {
+  return layout.basis == Basis::view && !layout.holdsPower() && readsNearEye(medium, layout, view);
 }
 
 LightFieldLayout nearLayout(const LightFieldLayout& layout) {
@@ -110,7 +122,8 @@ LightFieldLayout nearLayout(const LightFieldLayout& layout) {
   if (near.smoothing != Smoothing::visible) near.smoothing = Smoothing::twicing;
   if (layout.basis == Basis::view) {
     near.basis = Basis::histogram;
-    near.rows = kNearRows;
+    near.carrier = Carrier::voxels;
+    near.rows = std::max(kNearRows, layout.rows);
     near.angularKernel = sphere::AngularKernel::none;
   }
   return near;
@@ -126,11 +139,17 @@ std::vector<std::size_t> voxelsNearEye(const SupportLattice& lattice,
 }
 
 SupportLattice partOf(const SupportLattice& lattice, const std::vector<std::size_t>& voxels) {
+  Vec3i low(std::numeric_limits<int>::max()), high(0);
+  for (const std::size_t i : voxels) {
+    low = glm::min(low, lattice.voxel(i) >> 3);
+    high = glm::max(high, lattice.voxel(i) >> 3);
+  }
   std::vector<Vec3i> active;
   active.reserve(voxels.size());
   for (const std::size_t i : voxels)
-    active.push_back(lattice.voxel(i));
-  return {lattice.origin(), lattice.edge(), lattice.bricks(), active};
+    active.push_back(lattice.voxel(i) - 8 * low);
+  return {lattice.origin() + lattice.edge() * Vec3d(8 * low), lattice.edge(), high - low + 1,
+          active};
 }
 
 std::optional<LightField> nearField(const Medium& medium, LightField& field, const View& view) {

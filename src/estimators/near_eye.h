@@ -11,19 +11,15 @@
 
 namespace photosphere::estimators {
 
-/// Whether light near the eye is read apart: where the layout says so, by how many light voxels,
-/// and there is smoke.
-bool readsNearEye(const transport::Medium& medium, const LightFieldLayout& layout,
-                  const View& view);
-
-/// What is kept around the eye: the same, and directions where there are none (Basis::view).
-LightFieldLayout nearLayout(const LightFieldLayout& layout);
+/// Whether directions around the eye are gathered besides, on voxels (LightField::near).
+bool gathersNearEye(const transport::Medium& medium, const LightFieldLayout& layout,
+                    const View& view);
 
 /// Numbers of the voxels of `lattice` that readings near the eye ask for, in their order.
 std::vector<std::size_t> voxelsNearEye(const transport::SupportLattice& lattice,
                                        const LightFieldLayout& layout, const View& view);
 
-/// Those voxels of a lattice as one of their own.
+/// Those voxels, one or more, of a lattice as one of their own, no wider than they need.
 transport::SupportLattice partOf(const transport::SupportLattice& lattice,
                                  const std::vector<std::size_t>& voxels);
 

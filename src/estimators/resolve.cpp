@@ -192,6 +192,10 @@ std::shared_ptr<const std::vector<float>> visibleWeights(const Medium& medium,
 
 std::unique_ptr<InscatterSource> resolve(const Medium& medium, LightField field, const View& view,
                                          RandomKey key) {
+  // Not of a cache that was stored without.
+  if (field.layout.smoothing == Smoothing::visible && field.layout.carrier == Carrier::voxels &&
+      !field.weights)
+    field.weights = visibleWeights(medium, field.lattice, field.layout, view);
   if (field.layout.evaluate == Evaluate::perStep)
     return evaluatePerStep(medium, std::move(field), key);
   std::optional<LightField> near = nearField(medium, field, view);

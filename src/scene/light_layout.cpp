@@ -186,11 +186,12 @@ void chooseLayout(const SceneFile& scene, bool forLightCache, FrameSetup& setup)
   l.phases = static_cast<int>(setup.medium->phases().size());
   for (const auto& light : setup.lights)
     l.unscattered = l.unscattered || (!light->isDelta() && setup.effects.singleScattering);
-  if (!forLightCache && !even && setup.view.hasEye && l.evaluate == Evaluate::perView)
-    l.nearEye = kNearVoxels;
   chooseSmoothing(e, setup);
   chooseLightVoxel(e, setup);
   chooseRadius(e, setup);
+  // Last: how light is stored elsewhere must not depend on where the eye is.
+  if (!forLightCache && !even && setup.view.hasEye && l.evaluate == Evaluate::perView)
+    l.nearEye = kNearVoxels;
 }
 
 }  // namespace photosphere::scene

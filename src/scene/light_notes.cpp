@@ -30,7 +30,9 @@ double sharpestLobe(const transport::Medium& medium) {
 
 void noteCoarseDirections(FrameSetup& setup) {
   using estimators::Basis;
-  const estimators::LightFieldLayout& l = setup.layout;
+  const bool nearEye = estimators::nearEyeBytes(*setup.medium, setup.layout, setup.view) > 0;
+  const estimators::LightFieldLayout l =
+      nearEye ? estimators::nearLayout(setup.layout) : setup.layout;
   if (l.basis == Basis::view) return;
   const bool bins = l.basis == Basis::histogram;
   const double apart = bins ? std::sqrt(4 * kPi / l.bins()) : kPi / std::max(1, l.order);  // [rad]
@@ -50,18 +52,26 @@ void noteCoarseDirections(FrameSetup& setup) {
   setup.notes.push_back(fmt::format(
       "a phase function has a lobe of g = {:.6g}, narrower than the directions that stored light "
       "tells apart ({}, {:.2g} rad): light scattered more than once is too dim in it or too bright "
-      "beside it; raise estimator.{} (basis = \"view\", without a cache or final_gather, tells all "
-      "apart)",
+      "beside it{}; raise estimator.{}{}",
       g, bins ? fmt::format("{} bins", l.bins()) : fmt::format("harmonics of order {}", l.order),
-      apart, bins ? "rows" : "order"));
+      apart, nearEye ? ", next to the eye" : "", bins ? "rows" : "order",
+      nearEye ? ""
+              : " (basis = \"view\", without a cache or final_gather, tells all apart but next to "
+                "an eye in smoke)"));
 }
 
 void noteEyeInSmoke(FrameSetup& setup) {
-  if (estimators::nearEyeBytes(*setup.medium, setup.layout, setup.view) == 0) return;
+  if (setup.layout.basis != estimators::Basis::view ||
+      !estimators::readsNearEye(*setup.medium, setup.layout, setup.view))
+    return;
   setup.notes.push_back(fmt::format(
-      "the eye is in smoke that scatters more to one side than to another: within {:.3g} light "
-      "voxels of it directions are kept, and looked up toward the eye of each ray",
-      setup.layout.nearEye));
+      "the eye is in smoke that scatters more to one side than to another: {}",
+      setup.layout.holdsPower()
+          ? "next to it particles keep no directions, and what a lobe sends to the eye is too dim; "
+            "estimator.basis = \"histogram\" keeps them"
+          : fmt::format("within {:.3g} light voxels of it directions are kept, and looked up "
+                        "toward the eye of each ray",
+                        setup.layout.nearEye)));
 }
 
 void noteFewCarriers(FrameSetup& setup) {

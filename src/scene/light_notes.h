@@ -13,7 +13,7 @@ double sharpestLobe(const transport::Medium& medium);
 void noteCoarseDirections(FrameSetup& setup);
 
 /// Adds a note where the eye is in smoke that does not scatter evenly, and directions are kept
-/// there that are not kept elsewhere.
+/// there that are not kept elsewhere, or should be.
 void noteEyeInSmoke(FrameSetup& setup);
 
 /// Adds a note where fewer particles carry light than one look-up takes.

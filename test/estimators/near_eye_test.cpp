@@ -138,6 +138,12 @@ INSTANTIATE_TEST_SUITE_P(
                            l.smoothing = Smoothing::visible;
                            return l;
                          }},
+                    Kept{"particles_view", 0.2,
+                         [](double n) {
+                           LightFieldLayout l = layoutOf(Basis::view, n);
+                           l.carrier = Carrier::particles;
+                           return l;
+                         }},
                     Kept{"particles", 0.2,
                          [](double n) {
                            LightFieldLayout l = layoutOf(Basis::histogram, n);
@@ -172,6 +178,27 @@ TEST(NearEyeSums, TheRestStays) {
   transport::Coefficients c;
   smoke.medium.coefficients(p, c, transport::Still());
   EXPECT_EQ(a->at(p, wo, c).single, b->at(p, wo, c).single);
+}
+
+// Power is read off particles as it was left: their one colour has no place for directions.
+TEST(NearEyeSums, PowerOnParticlesKeepsNone) {
+  const ThinSmoke smoke;
+  LightFieldLayout layout = layoutOf(Basis::view, 3);
+  layout.carrier = Carrier::particles;
+  layout.deposit = Deposit::collision;
+  EXPECT_EQ(nearEyeBytes(smoke.medium, layout, smoke.view), 0u);
+  EXPECT_FALSE(smoke.trace(layout).near);
+}
+
+// However wide the kernel is, it is no more than the smoke.
+TEST(NearEyeSums, MemoryIsThatOfTheSmoke) {
+  const ThinSmoke smoke;
+  LightFieldLayout layout = layoutOf(Basis::view, 3);
+  layout.radius = 1e6;
+  layout.lightVoxel = 1e-3;
+  EXPECT_LE(nearEyeBytes(smoke.medium, layout, smoke.view), std::uint64_t{1} << 60);
+  layout = layoutOf(Basis::view, 3);
+  EXPECT_LT(nearEyeBytes(smoke.medium, layout, smoke.view), 64u << 20);
 }
 
 // Nothing is kept where no smoke is near, or nobody looks.

@@ -150,8 +150,15 @@ LightField traceLightField(const transport::Medium& medium, const transport::Lig
 double automaticRadius(const transport::Medium& medium, const LightFieldLayout& layout,
                        std::uint64_t photons);
 
+/// Whether light near the eye is read apart from the rest: where the layout says so
+/// (LightFieldLayout::nearEye), and there is smoke.
+bool readsNearEye(const transport::Medium& medium, const LightFieldLayout& layout,
+                  const View& view);
+/// What is kept around the eye: the same, and bins of directions where there are none
+/// (Basis::view), at least as many as `rows` makes.
+LightFieldLayout nearLayout(const LightFieldLayout& layout);
 /// Memory that directions around an eye in smoke take at most while they are gathered and read, for
-/// Basis::view [B].
+/// Basis::view, which keeps none elsewhere [B]; 0 where none are kept (power on particles).
 std::uint64_t nearEyeBytes(const transport::Medium& medium, const LightFieldLayout& layout,
                            const View& view);
 
