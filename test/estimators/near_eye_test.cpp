@@ -16,7 +16,7 @@ using namespace estimators;
 
 constexpr double kEdge = 1.0 / 32;  // of a density voxel
 constexpr double kG = 0.5;
-constexpr std::uint64_t kPhotons = kSanitized ? 20'000 : 200'000;
+constexpr std::uint64_t kPhotons = 200'000;
 
 // Smoke so thin that all the light in it is that of a small lamp far away on the +x axis, 1 W/m^2:
 // radiance times pi (0.6 / 60)^2.
